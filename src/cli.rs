@@ -19,17 +19,29 @@ mod render;
 mod report;
 mod serve;
 mod study;
+mod task;
 mod vary;
 #[cfg(feature = "window")]
 mod view;
 
-/// Real-time ultrasound by Monte-Carlo path tracing.
+/// Real-time ultrasound by Monte-Carlo path tracing. Without a command it opens the window with pictures of the scenes
+/// that ship.
 #[derive(Debug, Parser)]
-#[command(name = "insonify", version)]
+#[command(name = "insonify", version, after_help = EXAMPLES)]
+#[cfg_attr(not(feature = "window"), command(arg_required_else_help = true))]
 struct Cli {
     #[command(subcommand)]
-    command: Command,
+    command: Option<Command>,
 }
+
+/// The end of `--help`.
+const EXAMPLES: &str = "\
+Start with:
+  insonify                             the window: choose a scene, drag the probe on the skin
+  insonify view heart                  the window with a scene that ships, or with a scene file
+  insonify render abdomen -o out/abdomen.png
+  insonify info                        the Vulkan devices of this machine
+Scenes that ship: abdomen, artery, early, ectopic, fetus, heart, limbs, phantom, pregnancy.";
 
 #[derive(Debug, Subcommand)]
 enum Command {
@@ -55,6 +67,8 @@ enum Command {
     Serve(Box<serve::Serve>),
     /// Make a user study of realism (form and key), or tables of what was answered
     Study(study::Study),
+    /// Score recorded trajectories at the tasks that a scene sets its learners
+    Task(Box<task::Arguments>),
     /// Render a scene many times, one parameter at a time, onto one labelled sheet
     // Its old name was `sweep`, which now means a path of the probe.
     #[command(alias = "sweep")]
@@ -64,10 +78,19 @@ enum Command {
     View(Box<view::View>),
 }
 
+/// The command that is asked for.
+fn command() -> Command {
+    #[cfg(feature = "window")]
+    let bare = || Cli::parse_from(["insonify", "view", "--gallery"]).command;
+    #[cfg(not(feature = "window"))]
+    let bare = || None;
+    Cli::parse().command.or_else(bare).expect("clap asks for one")
+}
+
 /// Runs the command line. An error is printed once, with its remedy; the exit code is then 1.
 pub fn run() -> ExitCode {
     report::install();
-    let result = match Cli::parse().command {
+    let result = match command() {
         Command::Acquire(args) => acquire::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Check(check) => check.run(),
         Command::Dataset(args) => dataset::run(&args).map(|()| ExitCode::SUCCESS),
@@ -79,6 +102,7 @@ pub fn run() -> ExitCode {
         Command::Render(render) => render::run(&render).map(|()| ExitCode::SUCCESS),
         Command::Serve(serve) => serve::run(&serve).map(|()| ExitCode::SUCCESS),
         Command::Study(study) => study::run(&study).map(|()| ExitCode::SUCCESS),
+        Command::Task(args) => task::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Vary(vary) => vary::run(&vary).map(|()| ExitCode::SUCCESS),
         #[cfg(feature = "window")]
         Command::View(view) => view::run(&view).map(|()| ExitCode::SUCCESS),
@@ -98,5 +122,16 @@ pub fn run() -> ExitCode {
             output::note(format!("{report:?}"));
             ExitCode::FAILURE
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::EXAMPLES;
+    use insonify::scene::shipped;
+
+    #[test]
+    fn the_help_names_the_scenes_that_ship() {
+        assert!(EXAMPLES.ends_with(&format!("{}.", shipped::names())), "{}", shipped::names());
     }
 }

@@ -1,11 +1,13 @@
 //! OpenIGTLink: a server to which trackers and viewers connect (protocol versions 1 to 3; Tokuda et
 //! al., Int J Med Robotics 5, 2009). A client moves the probe by TRANSFORM or TDATA messages; every
-//! client that has room receives the B-mode image and the probe's pose.
+//! client that has room receives the B-mode image and the probe's pose. COMMAND and STRING messages set
+//! keys of the scene file, time and scene, and are answered.
 //!
 //! In messages everything is in RAS and mm: 3D Slicer reads matrices so, whatever axes an image states.
 
 mod answer;
 mod client;
+pub mod command;
 pub mod image;
 pub mod message;
 mod metadata;
@@ -15,6 +17,7 @@ mod server;
 mod tracking;
 pub mod wire;
 
+pub use command::{Order, Request};
 pub use picture::Picture;
 pub use server::{IgtlError, Server, ServerSettings, Status};
 pub use tracking::{TrackedPose, TrackerState};

@@ -8,6 +8,8 @@
 
 pub mod acquire;
 pub mod dataset;
+pub mod exam;
+pub mod exchange;
 pub mod gpu;
 pub mod igtl;
 pub mod import;
@@ -23,6 +25,7 @@ pub mod settings;
 pub mod sim;
 pub mod statistics;
 pub mod study;
+pub mod teach;
 #[cfg(feature = "window")]
 pub mod view;
 pub mod volume;

@@ -1,23 +1,26 @@
-//! Matching the simulation to an acquired volume: settings of the image formation with which the
-//! speckle inside the mask's border has the brightness, the spread and the size of that outside.
+//! Matching the simulation to an acquired volume: settings of the image formation with which the scene's
+//! own tissue around the mask has the brightness, the spread and the size of speckle that the volume shows there.
 //!
-//! Both sides are taken to show the same kind of tissue: who draws a mask through it wants no border to
-//! be seen. What differs then is the machine: gain, time-gain compensation, dynamic range, and the
+//! Tissue is compared with the same tissue at the same place: the scene is simulated as if it had no mask, and the
+//! labels say which tissue that shows around it. What is inside the mask may be another one, brighter or darker, and
+//! is not looked at. What differs then is the machine: gain, time-gain compensation, dynamic range, and the
 //! point-spread function.
 
 mod adjust;
-mod bands;
+mod band;
 mod histogram;
 mod statistics;
 
 use thiserror::Error;
 
 use crate::scene::{Imaging, Scene};
+use crate::settings::Surroundings;
 use crate::sim::calibration::Calibration;
+use crate::sim::layout::Label;
 use crate::sim::{SimError, Simulator};
 pub use adjust::Adjusted;
 use adjust::{change, common, halfway, proposal};
-use bands::Bands;
+use band::Band;
 use statistics::Gathered;
 pub use statistics::{Level, SPECKLE_DEVIATION, Statistics, Width, depths};
 
@@ -33,7 +36,7 @@ const WHOLE_ROUNDS: usize = 3;
 const BLACK_LEVEL: f32 = 0.03;
 /// Patches of speckle that each side needs: spread and size are then known to a tenth.
 const LEAST_PATCHES: f64 = 60.0;
-/// Margins inside the border. The beam reaches over it, where nothing echoes: up to this many of its
+/// Margins outside the border. The beam reaches over it into what is inside the mask: up to this many of its
 /// lateral deviations. The pulse of an echo of the border itself reaches farther: axial deviations.
 const MARGIN: (f64, f64) = (1.5, 3.0);
 /// Level above the electronic noise up to which a sample is taken for noise, dB.
@@ -42,7 +45,7 @@ const ABOVE_NOISE: f64 = 6.0;
 /// Settings of a matching.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
-    /// Width of the bands on either side of the mask's border, mm.
+    /// Width of the band around the mask's border, mm.
     pub band: f64,
     /// Realisations of the simulated speckle that are averaged, at least 1.
     pub frames: u32,
@@ -55,14 +58,16 @@ pub struct Options {
 pub struct Stage {
     /// The settings.
     pub imaging: Imaging,
-    /// The simulation with them, in the band inside the mask.
+    /// The simulation with them, in the band around the mask.
     pub simulated: Statistics,
 }
 
 /// Result of a matching.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Matching {
-    /// The acquired volume in the band outside the mask.
+    /// The tissue that is compared: that of most of the band.
+    pub tissue: String,
+    /// The acquired volume in the band around the mask.
     pub acquired: Statistics,
     /// Settings and simulation before the first round.
     pub before: Stage,
@@ -74,8 +79,10 @@ pub struct Matching {
     pub rounds: usize,
     /// True if a further round would change next to nothing.
     pub settled: bool,
-    /// Properties that could not be matched, or only in part, with the reason.
+    /// Properties that could not be matched, with the reason.
     pub notes: Vec<String>,
+    /// Why the result is that of no scanner and should not be used; empty where it may be.
+    pub faults: Vec<String>,
 }
 
 impl Matching {
@@ -89,6 +96,12 @@ impl Matching {
             Some(range * (there - levels(&stage.simulated, i)?))
         };
         self.compared.iter().filter_map(error).collect()
+    }
+
+    /// Root mean square of [`Self::level_errors`], dB.
+    pub fn level_deviation(&self, stage: &Stage) -> f64 {
+        let off = self.level_errors(stage);
+        (off.iter().map(|e| e * e).sum::<f64>() / off.len() as f64).sqrt()
     }
 }
 
@@ -112,8 +125,8 @@ fn nothing(cause: impl Into<String>, remedy: &str) -> MatchError {
     MatchError::Nothing { cause: cause.into(), remedy: remedy.to_owned() }
 }
 
-/// Changes `scene.imaging` until the simulation looks like the acquired volume near the mask's border.
-/// `told` is called with each round's settings before it is simulated.
+/// Changes `scene.imaging` until the scene's tissue around the mask looks as the acquired volume shows it there.
+/// `told` is called with each round's settings before it is simulated. Whether the result may be used, its `faults` say.
 ///
 /// # Errors
 /// A scene that shows no volume or no border of its mask, a side without speckle, an error of the device.
@@ -124,9 +137,9 @@ pub fn fit(
     options: &Options,
     mut told: impl FnMut(usize, &Imaging),
 ) -> Result<Matching, MatchError> {
-    let start = (scene.imaging.clone(), scene.simulation.seed);
+    let start = (scene.imaging.clone(), scene.simulation.clone(), scene.fusion.clone());
     let result = settle(simulator, scene, options, &mut told);
-    scene.simulation.seed = start.1;
+    (scene.simulation, scene.fusion) = (start.1, start.2);
     if result.is_err() {
         scene.imaging = start.0;
     }
@@ -147,9 +160,11 @@ fn settle(
     }
     told(0, &scene.imaging);
     simulator.frame(scene, 0)?;
-    let bands = bands(simulator, scene)?;
-    let acquired = acquired(simulator, scene, &bands, options.band)?;
-    let mut stage = simulate(simulator, scene, &bands, options)?;
+    let mut band = band(simulator, scene, options.band)?;
+    let volume = background(simulator, scene)?;
+    let tissue = keep_one_tissue(simulator, scene, &mut band)?;
+    let acquired = acquired(scene, &band, &volume)?;
+    let mut stage = simulate(simulator, scene, &band, options)?;
     let before = stage.clone();
     let mut rounds = 0;
     loop {
@@ -157,12 +172,12 @@ fn settle(
         let compared: Vec<usize> = used.iter().map(|u| u.0).collect();
         if compared.is_empty() {
             return Err(nothing(
-                "at no depth is there speckle on both sides of the mask's border that is neither black \
-                 nor white",
-                "widen --band, change gain until speckle shows inside the mask, or move the mask",
+                "at no depth do both the volume and the simulation show speckle around the mask that is \
+                 neither black nor white",
+                "widen --band, change gain until the simulation shows speckle, or move the mask",
             ));
         }
-        let (imaging, mut notes) =
+        let (imaging, mut faults) =
             proposal(&scene.probe, &stage.imaging, &stage.simulated, &acquired, options.adjusted);
         let places = depths(&scene.probe);
         let places: Vec<f64> = compared.iter().map(|&i| places[i]).collect();
@@ -171,8 +186,12 @@ fn settle(
             && change.range <= LEAST_CHANGE.range
             && change.size <= LEAST_CHANGE.size;
         if settled || rounds == MOST_ROUNDS {
-            unmeasured(&stage.simulated, &acquired, options.adjusted, &mut notes);
-            return Ok(Matching {
+            let notes = unmeasured(&stage.simulated, &acquired, options.adjusted);
+            if !settled {
+                faults.push(format!("it has not settled after {rounds} rounds"));
+            }
+            let mut made = Matching {
+                tissue,
                 acquired,
                 before,
                 after: stage,
@@ -180,7 +199,15 @@ fn settle(
                 rounds,
                 settled,
                 notes,
-            });
+                faults,
+            };
+            let [before, after] = [&made.before, &made.after].map(|s| made.level_deviation(s));
+            if after > before + LEAST_CHANGE.level {
+                made.faults.push(format!(
+                    "brightness would differ by {after:.1} dB instead of {before:.1} dB"
+                ));
+            }
+            return Ok(made);
         }
         rounds += 1;
         scene.imaging = match rounds <= WHOLE_ROUNDS {
@@ -188,13 +215,14 @@ fn settle(
             false => halfway(&stage.imaging, &imaging),
         };
         told(rounds, &scene.imaging);
-        stage = simulate(simulator, scene, &bands, options)?;
+        stage = simulate(simulator, scene, &band, options)?;
     }
 }
 
-/// Notes the settings left unchanged because one side does not show their effect.
-fn unmeasured(a: &Statistics, b: &Statistics, adjusted: Adjusted, notes: &mut Vec<String>) {
+/// Notes on settings left unchanged because one side does not show their effect.
+fn unmeasured(a: &Statistics, b: &Statistics, adjusted: Adjusted) -> Vec<String> {
     let here = |w: Option<Width>| w.is_some_and(|w| !w.open);
+    let mut notes = Vec::new();
     for (wanted, what, simulated, acquired) in [
         (adjusted.range, "dynamic_range", a.spread.is_some(), b.spread.is_some()),
         (adjusted.size, "psf_scale (axial)", here(a.axial), b.axial.is_some()),
@@ -212,12 +240,30 @@ fn unmeasured(a: &Statistics, b: &Statistics, adjusted: Adjusted, notes: &mut Ve
             ));
         }
     }
+    notes
 }
 
-fn bands(simulator: &mut Simulator, scene: &Scene) -> Result<Bands, MatchError> {
+/// The band around the mask in the last frame, which was fused.
+fn band(simulator: &mut Simulator, scene: &Scene, width: f64) -> Result<Band, MatchError> {
     let steps = simulator.fusion_steps()?.expect("the frame was fused");
     let acquired = scene.volume.as_ref().expect("it is shown");
-    Ok(Bands::new(scene, acquired, simulator.constants(), &steps))
+    let mut band = Band::new(scene, acquired, simulator.constants(), &steps, width);
+    if band.is_empty() {
+        return Err(nothing(
+            "the image shows no border of the mask with anything beside it or in front of it",
+            "move the mask or the probe until the image shows both sides",
+        ));
+    }
+    band.keep_acquired();
+    if band.is_empty() {
+        return Err(nothing(
+            format!(
+                "the volume does not reach to the mask: nothing within {width} mm of it was acquired"
+            ),
+            "move the volume or the mask, or widen --band",
+        ));
+    }
+    Ok(band)
 }
 
 /// The volume's levels in the scale of the log image: before the grey map.
@@ -228,48 +274,54 @@ fn background(simulator: &mut Simulator, scene: &Scene) -> Result<Vec<f32>, Matc
     Ok(prescan.iter().map(|s| s[1].powf(exponent)).collect())
 }
 
-/// Returns the statistics of the volume outside the mask.
-fn acquired(
+/// Lets the scene be simulated everywhere from now on, and keeps of the band what shows the tissue that most of
+/// it shows; returns its name.
+fn keep_one_tissue(
     simulator: &mut Simulator,
-    scene: &Scene,
-    bands: &Bands,
-    width: f64,
-) -> Result<Statistics, MatchError> {
+    scene: &mut Scene,
+    band: &mut Band,
+) -> Result<String, MatchError> {
+    let fusion = scene.fusion.as_mut().expect("the frame was fused");
+    fusion.surroundings = Surroundings::Scatterers;
+    scene.simulation.labels = true;
+    simulator.frame(scene, 0)?;
+    scene.simulation.labels = false;
+    let labels = simulator.labels()?.expect("they were asked for").samples.labels;
+    let mut counts = vec![0; scene.tissues.len()];
+    for label in band.of(&labels) {
+        // Not where the beam was bent into another tissue, and not where it does not get to.
+        if label.tissue == label.true_tissue
+            && let Some(count) = counts.get_mut(label.tissue as usize)
+        {
+            *count += 1;
+        }
+    }
+    let most = (0..counts.len()).max_by_key(|&i| counts[i]).expect("there is a background");
+    let own = |label: &Label| [label.tissue, label.true_tissue] == [most as u32; 2];
+    band.keep(|at| own(&labels[at]));
+    Ok(scene.tissues[most].name.clone())
+}
+
+/// Returns the statistics of the volume in the band.
+fn acquired(scene: &Scene, band: &Band, levels: &[f32]) -> Result<Statistics, MatchError> {
     let probe = &scene.probe;
-    let levels = background(simulator, scene)?;
-    let mut chosen = bands.outside(width);
-    let count = |chosen: &[bool]| chosen.iter().filter(|&&c| c).count();
-    if count(&chosen) == 0 {
-        return Err(nothing(
-            "the image shows no border of the mask with anything outside it",
-            "move the mask or the probe until the image shows both sides",
-        ));
-    }
-    bands.keep_acquired(&mut chosen);
-    if count(&chosen) == 0 {
-        return Err(nothing(
-            format!(
-                "the volume does not reach to the mask: nothing within {width} mm of it was acquired"
-            ),
-            "move the volume or the mask, or widen --band",
-        ));
-    }
+    let mut chosen = band.chosen(|_| 0.0);
     let floor = vec![BLACK_LEVEL; probe.samples as usize];
-    bands.keep_echoing(probe, &levels, &floor, &mut chosen);
+    band.keep_echoing(probe, levels, &floor, &mut chosen);
     let mut gathered = Gathered::new(probe);
-    gathered.add(probe, &levels, &chosen);
+    gathered.add(probe, levels, &chosen);
     enough(
         gathered.statistics(probe),
-        "of the acquired volume outside the mask",
+        "of the acquired volume around the mask",
         "widen --band, or move the mask to where the volume shows tissue",
     )
 }
 
-/// Simulates the scene and returns its statistics inside the mask.
+/// Simulates the scene and returns its statistics in the band.
 fn simulate(
     simulator: &mut Simulator,
     scene: &mut Scene,
-    bands: &Bands,
+    band: &Band,
     options: &Options,
 ) -> Result<Stage, MatchError> {
     let seed = scene.simulation.seed;
@@ -278,38 +330,32 @@ fn simulate(
         scene.simulation.seed = seed.wrapping_add(frame);
         simulator.frame(scene, frame)?;
         let levels = simulator.log_image()?;
-        add_simulated(scene, bands, options.band, &levels, &mut gathered);
+        add_simulated(scene, band, &levels, &mut gathered);
     }
     scene.simulation.seed = seed;
     let simulated = enough(
         gathered.statistics(&scene.probe),
-        "of the simulation inside the mask",
-        "widen --band, let the mask enclose tissue that echoes, or raise the gain",
+        "of the scene's own tissue around the mask",
+        "widen --band, give the scene the tissue that the volume shows there (`background`), or raise the gain",
     )?;
     Ok(Stage { imaging: scene.imaging.clone(), simulated })
 }
 
-fn add_simulated(
-    scene: &Scene,
-    bands: &Bands,
-    width: f64,
-    levels: &[f32],
-    gathered: &mut Gathered,
-) {
+fn add_simulated(scene: &Scene, band: &Band, levels: &[f32], gathered: &mut Gathered) {
     let probe = &scene.probe;
     let imaging = &scene.imaging;
     let calibration = Calibration::new(scene);
     let axial = probe.sigma_axial() * imaging.psf_scale[0];
     let depth = |k: usize| k as f64 * probe.sample_pitch();
-    let mut chosen = bands
-        .inside(width, |k| (MARGIN.0 * calibration.sigma_lateral(depth(k))).max(MARGIN.1 * axial));
+    let mut chosen =
+        band.chosen(|k| (MARGIN.0 * calibration.sigma_lateral(depth(k))).max(MARGIN.1 * axial));
     let floor: Vec<f32> = (0..probe.samples as usize)
         .map(|k| {
             let noise = imaging.noise + imaging.gain + calibration.tgc_db(depth(k)) + ABOVE_NOISE;
             (1.0 + noise / imaging.dynamic_range).max(0.0) as f32
         })
         .collect();
-    bands.keep_echoing(probe, levels, &floor, &mut chosen);
+    band.keep_echoing(probe, levels, &floor, &mut chosen);
     gathered.add(probe, levels, &chosen);
 }
 

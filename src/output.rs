@@ -7,6 +7,7 @@ pub mod indexed;
 pub mod movie;
 pub mod npy;
 pub mod npz;
+pub mod picture;
 pub mod plot;
 pub mod sheet;
 pub mod uff;

@@ -22,7 +22,10 @@ pub mod normals;
 mod origin;
 pub mod palette;
 pub mod shapes;
+pub mod shipped;
+pub mod silent;
 pub mod smoothed;
+pub mod task;
 pub mod tissue;
 pub mod topology;
 pub mod tracker;
@@ -36,6 +39,7 @@ pub use fusion::Acquired;
 pub use graph::Graph;
 pub use keyframes::{Keyframes, Strategy};
 pub use origin::{Origin, Origins};
+pub use task::Task;
 pub use tracker::Tracker;
 
 use crate::probe::Probe;
@@ -130,6 +134,15 @@ impl Wire {
     }
 }
 
+/// A pose of the probe with a name: a standard view, a structure that is seen from there.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NamedPose {
+    /// Its name, once in a scene.
+    pub name: String,
+    /// World from probe space, rigid, mm.
+    pub world_from_probe: DAffine3,
+}
+
 /// Everything that a frame depends on.
 #[derive(Clone, Debug)]
 pub struct Scene {
@@ -151,6 +164,10 @@ pub struct Scene {
     pub settings: Settings,
     /// World from probe space (x lateral, y elevation, z depth), rigid, mm.
     pub world_from_probe: DAffine3,
+    /// Named poses of the probe.
+    pub poses: Vec<NamedPose>,
+    /// Tasks for a learner.
+    pub tasks: Vec<Task>,
     /// A volume acquired elsewhere, which may be shown around the masking meshes.
     pub volume: Option<Acquired>,
     /// Fusion of the volume with the simulation; none: everything is simulated.
@@ -192,6 +209,8 @@ impl Scene {
             wires: Vec::new(),
             settings: Settings::of(probe),
             world_from_probe: DAffine3::IDENTITY,
+            poses: Vec::new(),
+            tasks: Vec::new(),
             volume: None,
             fusion: None,
             contact: None,

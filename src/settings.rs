@@ -3,6 +3,7 @@
 //! Reading and writing scene files, `--set`, undo, the console, parameter studies, matching and the tables of
 //! `docs/scenes.md` are loops over the rows. Knows no file, no window and no kernel.
 
+mod exam;
 mod field;
 mod fusion;
 mod group;
@@ -16,6 +17,7 @@ mod tissue;
 pub mod units;
 mod words;
 
+pub use exam::Exam;
 pub use field::Field;
 pub use fusion::{Blend, Display, Fusion, MaskSpeed, Surroundings};
 pub(crate) use group::group;

@@ -11,7 +11,9 @@ pub mod facts;
 pub mod fields;
 pub mod fusion;
 pub mod labels;
+mod lane;
 pub mod layout;
+mod line;
 pub mod memory;
 pub mod pass;
 mod passes;
@@ -21,6 +23,7 @@ mod resize;
 mod results;
 mod rf;
 pub mod rounds;
+pub mod seen;
 pub mod shaders;
 pub mod special;
 pub mod stages;
@@ -36,16 +39,17 @@ use crate::gpu::{Abandon, AdapterKind, Device, FrameTimings, Frames, GpuError, I
 use crate::scene::{Scene, Surface, Tissue, Wire};
 use crate::settings::{Machine, Settings};
 use batches::FrameBudget;
-use buffers::Buffers;
 use bvh::Splits;
 use contact::SkinContact;
 use fusion::{FusionResources, Tint};
+use lane::Lane;
+pub use lane::Shot;
+use line::OneLine;
 pub use memory::Memory;
 use passes::{PassKernels, Passes, frame_constants};
-use read_out::ReadOut;
 pub use resize::image_size;
 use shaders::Library;
-use stages::{AXIAL, BEAM, CHART, DISPLAY, EXPECT, LABEL, LEVEL, ORIGIN, SCATTER};
+use stages::{AXIAL, BEAM, CHART, DISPLAY, LABEL, LEVEL, SCATTER};
 use tables::Tables;
 pub use tracer::Tracer;
 use view3d::Viewer3d;
@@ -73,7 +77,7 @@ pub fn machine(device: &Device) -> Machine {
 /// A scene on the device, ready to be imaged frame by frame.
 pub struct Simulator {
     device: Arc<Device>,
-    frames: Frames,
+    submissions: Frames,
     passes: Passes,
     coincident: bool,
     sources: Sources,
@@ -82,6 +86,8 @@ pub struct Simulator {
     counting: bool,
     /// True if the last frame was mixed with an acquired volume.
     fused: bool,
+    /// True if the labels of the last frame have levels.
+    levelled: bool,
     /// True if the last frame has labels.
     labelled: bool,
     /// The image into which the next frames are copied.
@@ -90,7 +96,8 @@ pub struct Simulator {
     viewer3d: Option<Viewer3d>,
     tinted_on: Option<(Image, Tint)>,
     painted_on: Option<(Image, f32)>,
-    read_out: ReadOut,
+    /// The image of the last frame whose results are read.
+    chosen: usize,
     update_time: Duration,
 }
 
@@ -126,8 +133,11 @@ struct Sources {
 
 impl Sources {
     fn of(scene: &Scene) -> Self {
+        let mut settings = scene.settings.clone();
+        // Seeds are no part of the tables.
+        settings.simulation.seed = 0;
         Self {
-            settings: scene.settings.clone(),
+            settings,
             tissues: scene.tissues.clone(),
             surfaces: scene.instances.iter().map(|i| i.surface).collect(),
             wires: scene.wires.clone(),
@@ -164,13 +174,12 @@ impl Simulator {
         let world = World::with_splits(device, &shapers, scene, tracer, splits)?;
         let coincident = scene.coincident_triangles() > 0;
         let budget = FrameBudget::of(device);
-        let (frame, batches) = frame_constants(scene, &world, coincident, 0, &budget);
+        let (frame, batches) = frame_constants(scene, &world, coincident, &budget, None);
         let tables = Tables::new(scene);
-        let buffers = Buffers::new(device, scene, batches.sizes(&frame, &tables))?;
-        let fusion = FusionResources::new(device, scene, None)?;
+        let lane = Lane::new(device, scene, batches.sizes(&frame, &tables), None)?;
         let simulator = Self {
             device: Arc::clone(device),
-            frames: Frames::new(device, "frame")?,
+            submissions: Frames::new(device, "frame")?,
             coincident,
             sources: Sources::of(scene),
             tables,
@@ -178,22 +187,22 @@ impl Simulator {
             counting: false,
             fused: false,
             labelled: false,
+            levelled: false,
             shown_on: None,
             viewer3d: None,
             tinted_on: None,
             painted_on: None,
-            read_out: ReadOut::default(),
+            chosen: 0,
             update_time: Duration::ZERO,
             passes: Passes {
                 kernels: PassKernels::new(device, library, scene, &world, false)?,
-                buffers,
-                fusion,
+                lanes: vec![lane],
+                active: 1,
                 skins: contact::Skins::default(),
-                touch: None,
                 world,
-                frame,
                 shown: frame,
-                began: false,
+                last: None,
+                remembers: false,
                 batches,
             },
         };
@@ -202,7 +211,7 @@ impl Simulator {
     }
 
     fn upload_tables(&self) -> Result<(), GpuError> {
-        let buffers = &self.passes.buffers;
+        let buffers = &self.passes.lanes[0].buffers;
         let arrays = self.tables.arrays().into_iter().filter(|(_, bytes)| !bytes.is_empty());
         let arrays: Vec<_> = arrays.map(|(name, bytes)| (&buffers[name], 0, bytes)).collect();
         self.device.upload_many(&arrays)
@@ -217,40 +226,58 @@ impl Simulator {
     /// # Errors
     /// A Vulkan error; a lost device names the last pass.
     pub fn frame(&mut self, scene: &Scene, index: u32) -> Result<Vec<FrameTimings>, SimError> {
+        self.frames(scene, &[Shot::of(scene, index)])
+    }
+
+    /// Simulates a frame of several images in one submission: of the scene as it is now, from the place and with the
+    /// seed and number of each shot. Each is to the bit what [`Self::frame`] makes of it alone; labels say what has
+    /// moved since the image before it. Else as [`Self::frame`]; [`Self::choose`] says which image is read.
+    ///
+    /// # Errors
+    /// Those of [`Self::frame`]; device out of memory for as many images as [`Self::most_shots`] has not promised.
+    ///
+    /// # Panics
+    /// Without shots.
+    pub fn frames(&mut self, scene: &Scene, shots: &[Shot]) -> Result<Vec<FrameTimings>, SimError> {
+        self.make(scene, shots, None)
+    }
+
+    /// Makes images, or one line of them each.
+    fn make(
+        &mut self,
+        scene: &Scene,
+        shots: &[Shot],
+        line: Option<OneLine>,
+    ) -> Result<Vec<FrameTimings>, SimError> {
+        assert!(!shots.is_empty(), "a frame without images");
         let exchanged = self.adopt(scene)?;
-        let labelled = scene.simulation.labels;
+        let labelled = scene.simulation.labels && line.is_none();
+        let levelled = labelled && scene.simulation.levelled();
         let passes = &mut self.passes;
-        let mut cmd = self.frames.begin()?;
-        self.update_time = exchanged + passes.update(&mut cmd, scene, self.coincident, index)?;
-        passes.touch(&mut cmd, scene)?;
-        passes.clear(&mut cmd);
-        passes.run(&mut cmd, &ORIGIN)?;
-        let mut turn = 0;
-        for begin in (0..passes.frame.paths).step_by(passes.batches.paths as usize) {
-            passes.trace(&mut cmd, begin, &mut turn)?;
-            passes.run(&mut cmd, &SCATTER)?;
-            if labelled {
-                passes.run(&mut cmd, &EXPECT)?;
-            }
-        }
-        if labelled {
-            passes.direct_echoes(&mut cmd)?;
-        }
+        let mut cmd = self.submissions.begin()?;
+        let updated = passes.update(&mut cmd, scene, &self.tables, self.coincident, shots, line)?;
+        self.update_time = exchanged + updated;
+        passes.touch(&mut cmd, scene, shots)?;
+        let sizes = passes.batches.sizes(passes.frame(), &self.tables);
+        passes.clear(&mut cmd, &sizes);
+        passes.echoes(&mut cmd, levelled)?;
         passes.run(&mut cmd, &BEAM)?;
         passes.run(&mut cmd, &AXIAL)?;
         // From here on the frame is not abandoned, so that the picture is replaced as a whole.
         cmd.keep_on();
         passes.run(&mut cmd, &DISPLAY)?;
-        self.labelled = labelled;
+        (self.labelled, self.levelled, self.chosen) = (labelled, levelled, 0);
         if labelled {
             passes.run(&mut cmd, &LABEL)?;
-            passes.surface_samples(&mut cmd)?;
-            passes.run(&mut cmd, &LEVEL)?;
+            if levelled {
+                passes.surface_samples(&mut cmd)?;
+                passes.run(&mut cmd, &LEVEL)?;
+            }
             passes.run(&mut cmd, &CHART)?;
         }
-        self.fused = scene.shows_volume() && passes.fuse(&mut cmd, scene)?;
+        self.fused = line.is_none() && scene.shows_volume() && passes.fuse(&mut cmd, scene)?;
         if let Some(image) = &self.shown_on {
-            cmd.copy_to_image(passes.pixels(self.fused), image)?;
+            cmd.copy_to_image(passes.lanes[0].pixels(self.fused), image)?;
         }
         if let (Some((image, tint)), true) = (&self.tinted_on, self.fused) {
             let tinted = passes.tint(&mut cmd, tint)?;
@@ -260,10 +287,12 @@ impl Simulator {
             let painted = passes.paint(&mut cmd, scene, *opacity, self.fused)?;
             cmd.copy_to_image(painted, image)?;
         }
-        self.read_out.record(&mut cmd, passes.pixels(self.fused))?;
+        passes.read_out(&mut cmd, &sizes)?;
         cmd.submit()?;
-        passes.shown = passes.frame;
-        Ok(self.frames.take_timings())
+        if line.is_none() {
+            passes.shown = *passes.frame();
+        }
+        Ok(self.submissions.take_timings())
     }
 
     /// Sets the question by which frames and 3D views may be abandoned: `wanted_no_longer` is asked now and
@@ -271,7 +300,7 @@ impl Simulator {
     /// [`GpuError::Abandoned`], and the last picture stays. Where the window shares the queue, recording a
     /// frame takes about as long as the frame itself.
     pub fn abandon_when(&mut self, wanted_no_longer: Option<Abandon>) {
-        self.frames.abandon_when(wanted_no_longer);
+        self.submissions.abandon_when(wanted_no_longer);
     }
 
     /// Takes over settings, strategies and placements that the device does not have yet, after the
@@ -280,19 +309,22 @@ impl Simulator {
         let sources = Sources::of(scene);
         if sources != self.sources {
             // The tables carry scales and levels that belong to the frame's constants.
-            self.frames.wait()?;
+            self.submissions.wait()?;
             let tables = self.table_cache.take(&sources);
             let tables = tables.unwrap_or_else(|| Tables::new(scene));
             let left = std::mem::replace(&mut self.tables, tables);
             let before = std::mem::replace(&mut self.sources, sources);
             self.table_cache.put(before, left);
-            self.passes.buffers.add(&self.device, stages::needed(scene))?;
+            // The others are made again when they are needed, with what the frame needs now.
+            self.passes.lanes.truncate(1);
+            (self.passes.active, self.chosen) = (1, 0);
+            self.passes.lanes[0].buffers.add(&self.device, stages::needed(scene))?;
             self.upload_tables()?;
         }
         if self.passes.world.serves(scene) {
             return Ok(Duration::ZERO);
         }
-        self.frames.wait()?;
+        self.submissions.wait()?;
         let began = Instant::now();
         self.passes.world.exchange(&self.device, scene)?;
         Ok(began.elapsed())
@@ -300,7 +332,7 @@ impl Simulator {
 
     /// True if the first frame will wait for the driver's compiler, because its kernels have never run here.
     pub fn compiles(&self) -> bool {
-        self.passes.kernels.of(&SCATTER).is_new()
+        self.passes.kernels.of(&SCATTER, self.passes.world.deforms()).is_new()
     }
 
     /// Builds the pipelines again from `library`'s kernels, after the frames in flight.
@@ -308,7 +340,7 @@ impl Simulator {
     /// # Errors
     /// A kernel that the device refuses; the simulator keeps the ones that it had.
     pub fn reload(&mut self, library: &Library) -> Result<(), SimError> {
-        self.frames.wait()?;
+        self.submissions.wait()?;
         let shapers = world::ShapeKernels::new(&self.device, library)?;
         let world = &self.passes.world;
         let kernels = &self.passes.kernels;
@@ -338,14 +370,14 @@ impl Simulator {
         self.update_time
     }
 
-    /// The contact of the probe with the skin in the last frame; none where the scene asks for no contact.
+    /// The contact of the probe with the skin in the chosen image of the last frame; none where the scene asks for no contact.
     pub fn contact(&self) -> Option<SkinContact> {
-        self.passes.touch
+        self.lane().touch
     }
 
     /// The device memory that the scene takes.
     pub fn memory(&self) -> Memory {
-        let fusion = self.passes.fusion.as_ref();
+        let fusion = self.passes.lanes[0].fusion.as_ref();
         Memory {
             volume: fusion.map_or(0, FusionResources::volume_bytes),
             ..self.passes.world.memory()
@@ -357,13 +389,13 @@ impl Simulator {
     /// # Errors
     /// A lost device, with the last pass that had begun.
     pub fn wait(&mut self) -> Result<Vec<FrameTimings>, SimError> {
-        self.frames.wait()?;
-        Ok(self.frames.take_timings())
+        self.submissions.wait()?;
+        Ok(self.submissions.take_timings())
     }
 
-    /// The constants of the last frame.
+    /// The constants of the chosen image of the last frame.
     pub fn constants(&self) -> &layout::Frame {
-        &self.passes.frame
+        &self.lane().frame
     }
 
     /// The tables as they are on the device.
@@ -377,21 +409,12 @@ impl Simulator {
     /// # Errors
     /// A Vulkan error.
     pub fn pixels(&mut self) -> Result<(u32, u32, Vec<u8>), SimError> {
-        let (width, height) = (self.passes.frame.image_width, self.passes.frame.image_height);
-        let mut bytes = vec![0; 4 * width as usize * height as usize];
-        match self.read_out.take() {
-            Some(copy) => self.frames.read(copy, &mut bytes)?,
-            None => {
-                self.frames.wait()?;
-                let pixels = self.passes.pixels(self.fused);
-                self.device.read_into(pixels, 0, &mut bytes)?;
-            }
-        }
-        Ok((width, height, bytes))
+        let (width, height) = (self.constants().image_width, self.constants().image_height);
+        Ok((width, height, self.read_again(lane::pixels(self.fused))?))
     }
 
     /// A warning for the user about how the scene was uploaded, if there is one.
     pub fn warning(&self) -> Option<&str> {
-        self.passes.fusion.as_ref().and_then(FusionResources::warning)
+        self.passes.lanes[0].fusion.as_ref().and_then(FusionResources::warning)
     }
 }

@@ -11,19 +11,28 @@ mod cine;
 mod console;
 mod deaths;
 pub mod engine;
+mod exam;
 mod files;
+mod framing;
+mod gallery;
 mod hold;
 mod inputs;
+mod keeper;
 mod keys;
 mod layout;
+mod leaving;
+mod lesson;
 mod link;
 pub mod look;
 mod mmode;
 pub mod model;
+mod naming;
 mod notes;
 mod notice;
+mod offer;
 mod open;
 mod opening;
+mod orders;
 mod pads;
 mod planes;
 mod real;
@@ -37,6 +46,7 @@ mod style;
 mod timing;
 mod tools;
 mod view3d;
+mod watch;
 
 use std::net::IpAddr;
 use std::path::PathBuf;
@@ -57,6 +67,8 @@ use crate::sim::{SimError, Tracer};
 pub struct Options {
     /// The scene file.
     pub file: PathBuf,
+    /// What is suspicious about the scene, as loading it has told.
+    pub warnings: Vec<String>,
     /// Settings of the command line, which replace those of the file.
     pub overrides: Vec<(String, String)>,
     /// The device to take; [`run`] adds that it must serve a window.
@@ -77,6 +89,8 @@ pub struct Options {
     pub listen: Option<Listen>,
     /// Folder of stills and clips.
     pub captures: PathBuf,
+    /// Begins with pictures of the scenes that ship.
+    pub gallery: bool,
     /// Fits path and scatterer counts to the device, and chooses a tracer that it has.
     pub prepare: Prepare,
 }
@@ -92,6 +106,13 @@ pub struct Listen {
 
 /// The type of [`Options::prepare`].
 pub type Prepare = Box<dyn Fn(&Arc<Device>, &mut Scene) -> Result<Tracer, Refusal>>;
+
+/// What to do first, in three lines.
+pub const FIRST_STEPS: [&str; 3] = [
+    "Drag the probe on the skin in the 3D view; Shift leans it, Ctrl and the wheel turn it.",
+    "Space freezes the image, L measures a distance in it, F2 saves it with its settings.",
+    "The console has gain, depth and all other settings; ? lists the keys.",
+];
 
 /// The reason why a device does not suit.
 pub type Refusal = Box<dyn std::error::Error + Send + Sync>;
@@ -153,9 +174,31 @@ pub enum ViewError {
 /// # Errors
 /// No display, no device that can show pictures, a device that is lost again and again.
 pub fn run(scene: Scene, options: Options) -> Result<(), ViewError> {
-    let display = |error: winit::error::EventLoopError| ViewError::Display(error.to_string());
+    let display = |error: winit::error::EventLoopError| {
+        ViewError::Display(without_place(&error.to_string()).to_owned())
+    };
     let events = EventLoop::with_user_event().build().map_err(display)?;
     let mut app = app::App::new(scene, options, events.create_proxy());
     events.run_app(&mut app).map_err(display)?;
     app.finish()
+}
+
+/// An error of the window system without the place in its library's sources that it begins with, and without its full
+/// stop.
+fn without_place(said: &str) -> &str {
+    let cause = said.split_once(".rs:").and_then(|(_, rest)| rest.split_once(": "));
+    cause.map_or(said, |(_, cause)| cause).trim_end_matches('.')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::without_place;
+
+    #[test]
+    fn errors_of_the_window_system_name_no_source_file() {
+        let said = "os error at /home/a/winit-0.30.12/src/platform_impl/linux/mod.rs:768: neither \
+                    WAYLAND_DISPLAY nor WAYLAND_SOCKET nor DISPLAY is set.";
+        let cause = "neither WAYLAND_DISPLAY nor WAYLAND_SOCKET nor DISPLAY is set";
+        assert_eq!([said, cause, ""].map(without_place), [cause, cause, ""]);
+    }
 }

@@ -328,10 +328,10 @@ fn the_command_writes_a_sequence_and_the_volume_that_it_makes() {
     assert!(off.abs().max_element() < 1e-9, "{off}");
 
     for (args, cause) in [
-        (&["--sweep", "linear:6mm"][..], "--output"),
+        (&["--sweep", "linear:6mm"][..], "nothing would be written"),
         (&["--sweep", "tilt:6", "-o", "c.mha"], "has no unit"),
         (&["--sweep", "linear:6mm", "-o", "c.nhdr"], "end the name in .mha or .nrrd"),
-        (&["--sweep", "linear:6mm", "-o", "none/c.mha"], "its folder does not exist"),
+        (&["--sweep", "linear:6mm", "-o", "a.toml/c.mha"], "folder cannot be made"),
         (&["--sweep", "none.csv", "-o", "c.mha"], "check the path"),
         (&["--sweep", "linear:6mm", "-o", "c.mha", "--spacing", "1"], "--volume"),
     ] {

@@ -103,6 +103,10 @@ fn a_moving_scene_looks_like_the_still_one() {
     let library = Library::embedded();
     for (name, seconds) in [("heart.toml", 0.3), ("fetus.toml", 3.1), ("limbs.toml", 0.9)] {
         let mut scene = small(name);
+        if name == "heart.toml" {
+            // The device interpolates in its own precision: the test below.
+            choose(&mut scene, Strategy::Exchange, 0.0);
+        }
         // Without keyframes there is no reference shape that tissue could follow.
         scene.simulation.texture_space = TextureSpace::Object;
         // Slopes of beams are averaged over each keyframe and then interpolated, not over the shape between them.

@@ -130,7 +130,7 @@ fn check_says_type_place_and_range() {
         "first voxel at (3.500, -20.250, 40.125) mm",
         "values ",
         "own frame of reference, taken for LPS",
-        "0 errors, 1 warnings",
+        "0 errors, 1 warning",
     ] {
         assert!(text.contains(said), "{said}: {text}");
     }
@@ -181,7 +181,7 @@ fn hostile_sizes_and_bombs_stay_within_bounds() {
         }
         let unchanged = std::fs::read(&path).expect("readable") == bad;
         if !unchanged {
-            folder.refused_within_bounds(&bad, "1 errors");
+            folder.refused_within_bounds(&bad, "1 error,");
         }
     }
     // Sequences in sequences, without an end.

@@ -329,7 +329,7 @@ fn check_describes_or_refuses_every_file() {
             let Outcome { code, text } = check(&path);
             match code {
                 Some(0) => assert!(text.contains("values ") && text.contains("0 errors"), "{text}"),
-                Some(1) => assert!(text.contains("help:") && text.contains("1 errors"), "{text}"),
+                Some(1) => assert!(text.contains("help:") && text.contains("1 error,"), "{text}"),
                 _ => panic!("{}: {code:?}\n{text}", path.display()),
             }
             counts[usize::from(code == Some(1))] += 1;

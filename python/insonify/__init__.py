@@ -19,7 +19,8 @@ for _name, _value in _insonify.driver_environment():
 
 from ._insonify import Frame, InsonifyError, Scene, SceneError, devices  # noqa: E402
 from .datasets import make_dataset  # noqa: E402
+from .files import save  # noqa: E402
 from .simulator import Frames, Simulator  # noqa: E402
 
 __version__ = _insonify.__version__
-__all__ = ["Frame", "Frames", "InsonifyError", "Scene", "SceneError", "Simulator", "devices", "make_dataset"]
+__all__ = ["Frame", "Frames", "InsonifyError", "Scene", "SceneError", "Simulator", "devices", "make_dataset", "save"]

@@ -43,6 +43,19 @@ def make_dataset(
 ) -> dict[str, Any]:
     """As insonify.make_dataset, which has the defaults."""
 
+def save(
+    path: str | PathLike[str],
+    about: str,
+    probe: dict[str, Any],
+    x: ArrayLike,
+    z: ArrayLike,
+    poses: ArrayLike,
+    times: Sequence[float],
+    arrays: dict[str, NDArray[Any]],
+    tissues: list[str],
+) -> None:
+    """As insonify.save, which gathers these facts of frames."""
+
 def driver_environment() -> list[tuple[str, str]]:
     """Variables that make Mesa's software driver compile in a third of the time; import sets them."""
 
@@ -133,11 +146,18 @@ class Frame:
     def legend(self) -> dict[str, Any]:
         """Meaning of the labels: names of tissues and meshes, units."""
     @property
+    def probe(self) -> dict[str, Any]:
+        """Settings of the probe by their keys (docs/scenes.md), in the units of Scene.describe; angles as text."""
+    @property
     def pose(self) -> NDArray[np.float64]:
         """World from probe space [4, 4]."""
     @property
     def timings(self) -> dict[str, float]:
-        """Milliseconds on the device by stage."""
+        """Milliseconds on the device by stage; of frames that were made together, the mean."""
+    @property
+    def took(self) -> float:
+        """Milliseconds by the clock until the image was read, without Python's part; of frames that were made together,
+        that of one of them."""
     @property
     def axes(self) -> dict[str, NDArray[np.float64]]:
         """Coordinates in probe space, mm: x [W] and z [H] of pixels' centres, depth [K] of samples, origins and
@@ -166,6 +186,20 @@ class Simulator:
 
         number: of the frame in a loop, by which the noise of the receiver differs. want: arrays to be read with it.
         RuntimeError: the simulator is closed, or another thread has it. InsonifyError: the device fails.
+        """
+    def frames_at_once(
+        self,
+        count: int,
+        poses: Sequence[ArrayLike] | None,
+        time: float | None,
+        seeds: Sequence[int] | None,
+        *,
+        number: int,
+        want: Sequence[Want],
+    ) -> list[Frame]:
+        """Simulates `count` frames of the scene at one time, together; `Simulator.frames` is for everybody.
+
+        What moved, labels say as if the anatomy had moved before each of them.
         """
     @property
     def scene(self) -> Scene: ...

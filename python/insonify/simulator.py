@@ -13,6 +13,9 @@ from . import _insonify
 if TYPE_CHECKING:
     from ._insonify import Want
 
+# Most frames of one call into the module, between which a loop shows its progress and can be interrupted.
+AT_ONCE = 64
+
 
 @dataclass
 class Frames:
@@ -20,7 +23,7 @@ class Frames:
 
     bmode: uint8 [N, H, W]. pose: float64 [N, 4, 4], world from probe, mm. What else was wanted stands under its name:
     iq complex64 [N, L, K], envelope, log and rf float32 [N, L, K] (rf with more samples to a line). labels is a
-    dictionary of such arrays, legend what their numbers mean.
+    dictionary of such arrays, legend what their numbers mean; probe are the probe's settings by their keys.
     """
 
     bmode: np.ndarray
@@ -29,6 +32,7 @@ class Frames:
     others: dict[str, np.ndarray] = field(default_factory=dict)
     labels: dict[str, np.ndarray] = field(default_factory=dict)
     legend: dict[str, Any] = field(default_factory=dict)
+    probe: dict[str, Any] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.bmode)
@@ -62,7 +66,9 @@ class Simulator(_insonify.Simulator):
     ) -> Frames:
         """Simulates N frames, each at its pose [N, 4, 4], time [N] (s) and seed [N]; what is None stays the scene's.
 
-        Frame i is to the bit what `frame(poses[i], times[i], seeds[i], number=i)` gives.
+        Frame i is to the bit what `frame(poses[i], times[i], seeds[i], number=i)` gives. Frames at the same time, one
+        after the other, are made together as far as the device has memory for them: a GPU, which has more threads than
+        one image needs, is faster so.
         """
         given = [(name, values) for name, values in (("poses", poses), ("times", times), ("seeds", seeds)) if values is not None]
         if not given:
@@ -78,23 +84,45 @@ class Simulator(_insonify.Simulator):
         labels: dict[str, np.ndarray] = {}
         axes: dict[str, np.ndarray] = {}
         legend: dict[str, Any] = {}
-        for i in _counted(count, progress):
-            frame = self.frame(
-                None if poses is None else poses[i],
-                None if times is None else float(times[i]),
-                None if seeds is None else int(seeds[i]),
-                number=i,
+        probe: dict[str, Any] = {}
+        counted = _counted(count, progress)
+        for start, end in _together(count, times, "labels" in wanted):
+            made = self.frames_at_once(
+                end - start,
+                None if poses is None else list(poses[start:end]),
+                None if times is None else float(times[start]),
+                None if seeds is None else [int(seed) for seed in seeds[start:end]],
+                number=start,
                 want=wanted,
             )
-            axes = axes or frame.axes
-            for name in ("bmode", "pose", *wanted):
-                if name != "labels":
-                    _put(rows, name, i, count, getattr(frame, name))
-                    continue
-                legend = legend or frame.legend
-                for label, values in frame.labels.items():
-                    _put(labels, label, i, count, values)
-        return Frames(rows.pop("bmode"), rows.pop("pose"), axes, rows, labels, legend)
+            for frame in made:
+                i = next(counted)
+                axes = axes or frame.axes
+                probe = probe or frame.probe
+                for name in ("bmode", "pose", *wanted):
+                    if name != "labels":
+                        _put(rows, name, i, count, getattr(frame, name))
+                        continue
+                    legend = legend or frame.legend
+                    for label, values in frame.labels.items():
+                        _put(labels, label, i, count, values)
+        next(counted, None)
+        return Frames(rows.pop("bmode"), rows.pop("pose"), axes, rows, labels, legend, probe)
+
+
+def _together(count: int, times: Sequence[float] | None, labels: bool) -> Iterator[tuple[int, int]]:
+    """First and last number of the frames that are made together, those between one time and another.
+
+    With labels, the first frame of each time is made alone: they tell what has moved since the frame before.
+    """
+    start = 0
+    while start < count:
+        end = start + 1
+        new = labels and (start == 0 or times is not None and times[start] != times[start - 1])
+        while not new and end < min(count, start + AT_ONCE) and (times is None or times[end] == times[start]):
+            end += 1
+        yield start, end
+        start = end
 
 
 def _put(arrays: dict[str, np.ndarray], name: str, i: int, count: int, values: np.ndarray) -> None:

@@ -87,7 +87,8 @@ pub fn pose(value: &Bound<'_, PyAny>) -> PyResult<DAffine3> {
     rigid(affine(value, "pose")?, "pose")
 }
 
-fn matrix(values: &[f64], name: &str) -> PyResult<DAffine3> {
+/// The affine map of a matrix in row order.
+pub fn matrix(values: &[f64], name: &str) -> PyResult<DAffine3> {
     let v = |row: usize, column: usize| values[4 * row + column];
     if [v(3, 0), v(3, 1), v(3, 2), v(3, 3)] != [0.0, 0.0, 0.0, 1.0] {
         return Err(PyValueError::new_err(format!(

@@ -11,6 +11,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arrays::{self, shaped};
+use crate::save;
 use crate::simulator::Simulator;
 
 /// What a frame has besides its image.
@@ -51,6 +52,8 @@ pub struct Picture {
     pub height: u32,
     pub rgba: Vec<u8>,
     pub passes: Vec<(String, f64)>,
+    /// From the call into the simulator until the image was read.
+    pub took_ms: f64,
     pub pose: DAffine3,
 }
 
@@ -173,6 +176,12 @@ impl Frame {
         py.import("json")?.call_method1("loads", (legend,))
     }
 
+    /// Settings of the probe by their keys.
+    #[getter]
+    fn probe<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        save::keys(py, &self.picture.probe)
+    }
+
     /// World from probe space, [4, 4].
     #[getter]
     fn pose<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
@@ -188,6 +197,12 @@ impl Frame {
             out.set_item(name, before + ms)?;
         }
         Ok(out)
+    }
+
+    /// Milliseconds by the clock until the image was read, without Python's part.
+    #[getter]
+    fn took(&self) -> f64 {
+        self.picture.took_ms
     }
 
     /// Coordinates of all arrays, mm in probe space.

@@ -10,6 +10,8 @@ mod arrays;
 mod dataset;
 mod error;
 mod frame;
+mod running;
+mod save;
 mod scene;
 mod simulator;
 mod toml;
@@ -57,6 +59,7 @@ fn _insonify(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<simulator::Simulator>()?;
     module.add_class::<frame::Frame>()?;
     module.add_function(wrap_pyfunction!(dataset::make_dataset, module)?)?;
+    module.add_function(wrap_pyfunction!(save::save, module)?)?;
     module.add_function(wrap_pyfunction!(devices, module)?)?;
     module.add_function(wrap_pyfunction!(driver_environment, module)?)
 }

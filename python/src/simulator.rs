@@ -2,168 +2,17 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 
-use glam::DAffine3;
-use insonify::gpu::{Device, DeviceOptions, FrameTimings, GpuError, cache_folder};
-use insonify::scene;
-use insonify::settings::{Quality, Settings, Words};
-use insonify::sim::calibration::Work;
-use insonify::sim::shaders::Library;
-use insonify::sim::{self, Tracer, labels};
+use insonify::gpu::{Device, DeviceOptions, GpuError, cache_folder};
+use insonify::settings::{Quality, Words};
+use insonify::sim::Tracer;
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 
 use crate::arrays;
 use crate::error::{InsonifyError, raised};
-use crate::frame::{Contents, Frame, Kind, Picture};
-use crate::scene::{Scene, State};
-
-/// What a frame is taken at, where it is not the scene's own.
-#[derive(Clone, Copy, Default)]
-pub struct Moment {
-    pub pose: Option<DAffine3>,
-    pub time: Option<f64>,
-    pub seed: Option<u32>,
-    /// Number of the frame in a loop: selects the noise.
-    pub number: u32,
-    /// True if labels are wanted, whatever the scene says.
-    pub labels: bool,
-}
-
-/// A simulator.
-struct Made {
-    simulator: sim::Simulator,
-    tracer: Tracer,
-    /// Generation of the scene for which it was made.
-    generation: u64,
-    /// Settings for which it has room.
-    fitted: Settings,
-}
-
-/// The scene on the device.
-pub struct Running {
-    device: Arc<Device>,
-    library: Library,
-    wanted: Option<Tracer>,
-    quality: Option<Quality>,
-    made: Option<Made>,
-    /// Meaning of the last frame's labels.
-    legend: String,
-    /// Frames made so far: results that were not read belong to the last one.
-    frames: u64,
-    pub notes: Vec<String>,
-}
-
-impl Running {
-    /// Simulates a frame; the scene is then what it was.
-    fn frame(&mut self, state: &mut State, moment: Moment) -> PyResult<(u64, Picture)> {
-        let own = (state.scene.world_from_probe, state.scene.simulation.clone());
-        state.at(moment.time.unwrap_or(state.time));
-        if let Some(pose) = moment.pose {
-            state.scene.world_from_probe = pose;
-        }
-        if let Some(seed) = moment.seed {
-            state.scene.simulation.seed = seed;
-        }
-        state.scene.simulation.labels |= moment.labels;
-        if let Some(quality) = self.quality {
-            let machine = sim::machine(&self.device);
-            let by_hand: Vec<String> = state.by_hand().map(str::to_owned).collect();
-            let by_hand = by_hand.iter().map(String::as_str);
-            state.scene.simulation.set_quality_except(quality, machine, by_hand);
-        }
-        let picture = self.pictured(&state.scene, state.generation, moment.number);
-        (state.scene.world_from_probe, state.scene.simulation) = own;
-        let time = state.time;
-        state.at(time);
-        self.frames += 1;
-        Ok((self.frames, picture?))
-    }
-
-    fn pictured(
-        &mut self,
-        scene: &scene::Scene,
-        generation: u64,
-        number: u32,
-    ) -> PyResult<Picture> {
-        let simulator = self.simulator(scene, generation)?;
-        simulator.frame(scene, number).map_err(|e| raised(&e))?;
-        let timings = simulator.wait().map_err(|e| raised(&e))?.pop().unwrap_or_default();
-        let (width, height, rgba) = simulator.pixels().map_err(|e| raised(&e))?;
-        let FrameTimings { passes, .. } = timings;
-        let constants = *simulator.constants();
-        if scene.simulation.labels {
-            self.legend = labels::legend(scene, &constants).to_string();
-        }
-        Ok(Picture {
-            constants,
-            probe: scene.probe.clone(),
-            width,
-            height,
-            rgba,
-            passes,
-            pose: scene.world_from_probe,
-        })
-    }
-
-    /// The simulator, made anew where the anatomy is another one, with room for the scene's settings.
-    fn simulator(
-        &mut self,
-        scene: &scene::Scene,
-        generation: u64,
-    ) -> PyResult<&mut sim::Simulator> {
-        if self.made.as_ref().is_none_or(|made| made.generation != generation) {
-            if let Some(Work { too_much, message, remedy }) = Work::of(scene) {
-                if too_much {
-                    return Err(InsonifyError::new_err(format!("{message}\n  help: {remedy}")));
-                }
-                self.notes.push(format!("{message}; {remedy}"));
-            }
-            // The old one first, so that there is room for the new one.
-            self.made = None;
-            let (tracer, why) = Tracer::choose(self.wanted, &self.device, &self.library, scene);
-            self.notes.extend(why);
-            let made = sim::Simulator::new(&self.device, &self.library, scene, tracer);
-            let simulator = made.map_err(|e| raised(&e))?;
-            self.notes.extend(simulator.warning().map(str::to_owned));
-            let fitted = scene.settings.clone();
-            self.made = Some(Made { simulator, tracer, generation, fitted });
-        }
-        let made = self.made.as_mut().expect("just made");
-        if made.fitted != scene.settings {
-            made.simulator.fit(scene).map_err(|e| raised(&e))?;
-            made.fitted = scene.settings.clone();
-        }
-        Ok(&mut made.simulator)
-    }
-
-    /// Contents of the last frame, if that is frame `number`.
-    fn contents(
-        &mut self,
-        number: u64,
-        kind: Kind,
-        probe: &insonify::probe::Probe,
-    ) -> PyResult<Contents> {
-        let made = self.made.as_mut().filter(|_| self.frames == number);
-        let Some(Made { simulator, .. }) = made else {
-            return Err(PyRuntimeError::new_err(
-                "the simulator has made another frame since: name what you want of a frame when you make it, e.g. \
-                 sim.frame(want=[\"iq\"])",
-            ));
-        };
-        let rows = |values| Contents::Rows(values, 1);
-        let read = match kind {
-            Kind::Iq => simulator.iq().map(rows),
-            Kind::Envelope => simulator.envelope().map(rows),
-            Kind::Log => simulator.log_image().map(rows),
-            Kind::Rf => simulator.rf(probe).map(|(factor, values)| Contents::Rows(values, factor)),
-            Kind::Labels => simulator.labels().map(|labels| {
-                let explained = |labels| (labels, self.legend.clone());
-                Contents::Labels(Arc::new(labels.map(explained)))
-            }),
-        };
-        read.map_err(|e| raised(&e))
-    }
-}
+use crate::frame::{Contents, Frame, Kind};
+use crate::running::{Running, Taken, Together, Wanted};
+use crate::scene::Scene;
 
 #[pyclass(frozen, subclass, module = "insonify")]
 pub struct Simulator {
@@ -172,6 +21,25 @@ pub struct Simulator {
 }
 
 impl Simulator {
+    /// Simulates images while Python goes on.
+    fn made(
+        slf: &Bound<'_, Self>,
+        wanted: Vec<Wanted>,
+        together: Together,
+    ) -> PyResult<Vec<Frame>> {
+        let mut running = slf.get().running()?;
+        let running = running.as_mut().expect("checked");
+        let state = Arc::clone(&slf.get().scene.get().state);
+        let taken = slf.py().detach(|| {
+            let mut state = state.lock().unwrap_or_else(PoisonError::into_inner);
+            running.images(&mut state, &wanted, &together)
+        })?;
+        let frame = |Taken { number, picture, contents }| {
+            Frame::new(slf.clone().unbind(), number, picture, contents)
+        };
+        Ok(taken.into_iter().map(frame).collect())
+    }
+
     /// The simulation, open or closed, if no other thread has it.
     fn held(&self) -> PyResult<MutexGuard<'_, Option<Running>>> {
         match self.running.try_lock() {
@@ -274,16 +142,7 @@ impl Simulator {
                 device.name()
             )));
         }
-        let running = Running {
-            device,
-            library: Library::embedded(),
-            wanted,
-            quality,
-            made: None,
-            legend: String::new(),
-            frames: 0,
-            notes: Vec::new(),
-        };
+        let running = Running::new(device, wanted, quality);
         Ok(Self { scene, running: Mutex::new(Some(running)) })
     }
 
@@ -296,28 +155,40 @@ impl Simulator {
         number: u32,
         want: Vec<String>,
     ) -> PyResult<Frame> {
-        let py = slf.py();
-        let kinds = kinds(&want)?;
-        let moment = Moment {
-            pose: pose.map(arrays::pose).transpose()?,
-            time: time.map(seconds).transpose()?,
-            seed,
-            number,
-            labels: kinds.contains(&Kind::Labels),
+        let wanted = Wanted { pose: pose.map(arrays::pose).transpose()?, seed, number };
+        let together = Together { time: time.map(seconds).transpose()?, kinds: kinds(&want)? };
+        let mut frames = Self::made(&slf, vec![wanted], together)?;
+        Ok(frames.pop().expect("one image"))
+    }
+
+    /// Frames at one time of the scene, numbered from `number` on.
+    #[pyo3(signature = (count, poses, time, seeds, *, number, want))]
+    fn frames_at_once(
+        slf: Bound<'_, Self>,
+        count: u32,
+        poses: Option<Vec<Bound<'_, PyAny>>>,
+        time: Option<f64>,
+        seeds: Option<Vec<u32>>,
+        number: u32,
+        want: Vec<String>,
+    ) -> PyResult<Vec<Frame>> {
+        let short = |given: usize| given < count as usize;
+        if short(poses.as_ref().map_or(usize::MAX, Vec::len))
+            || short(seeds.as_ref().map_or(usize::MAX, Vec::len))
+        {
+            return Err(PyValueError::new_err(format!("fewer poses or seeds than {count} frames")));
+        }
+        let wanted = |i: u32| {
+            let pose = poses.as_ref().map(|poses| arrays::pose(&poses[i as usize]));
+            Ok(Wanted {
+                pose: pose.transpose()?,
+                seed: seeds.as_ref().map(|seeds| seeds[i as usize]),
+                number: number.wrapping_add(i),
+            })
         };
-        let this = slf.clone();
-        let mut running = this.get().running()?;
-        let running = running.as_mut().expect("checked");
-        let state = Arc::clone(&this.get().scene.get().state);
-        let made = py.detach(|| {
-            let mut state = state.lock().unwrap_or_else(PoisonError::into_inner);
-            let (number, picture) = running.frame(&mut state, moment)?;
-            let read = |kind: Kind| Ok((kind, running.contents(number, kind, &picture.probe)?));
-            let contents = kinds.into_iter().map(read).collect::<PyResult<Vec<_>>>()?;
-            PyResult::Ok((number, picture, contents))
-        });
-        let (number, picture, contents) = made?;
-        Ok(Frame::new(slf.unbind(), number, picture, contents))
+        let wanted = (0..count).map(wanted).collect::<PyResult<Vec<_>>>()?;
+        let together = Together { time: time.map(seconds).transpose()?, kinds: kinds(&want)? };
+        Self::made(&slf, wanted, together)
     }
 
     /// The scene that is simulated.
@@ -330,15 +201,14 @@ impl Simulator {
     #[getter]
     fn device(&self) -> PyResult<String> {
         let running = self.running()?;
-        Ok(running.as_ref().expect("checked").device.name().to_owned())
+        Ok(running.as_ref().expect("checked").device().name().to_owned())
     }
 
     /// Name of the tracer; None before the first frame.
     #[getter]
     fn tracer(&self) -> PyResult<Option<String>> {
         let running = self.running()?;
-        let made = running.as_ref().expect("checked").made.as_ref();
-        Ok(made.map(|made| made.tracer.to_string()))
+        Ok(running.as_ref().expect("checked").tracer().map(|tracer| tracer.to_string()))
     }
 
     /// What was said about scene and device so far.
@@ -350,7 +220,7 @@ impl Simulator {
     /// Messages of Vulkan's validation layers.
     #[getter]
     fn validation_messages(&self) -> PyResult<Vec<String>> {
-        Ok(self.running()?.as_ref().expect("checked").device.validation_messages())
+        Ok(self.running()?.as_ref().expect("checked").device().validation_messages())
     }
 
     /// Gives the device's memory back; frames keep what was read of them.

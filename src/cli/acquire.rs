@@ -23,6 +23,7 @@ mod planes;
 #[derive(Debug, Args)]
 pub struct Acquire {
     /// Scene file (.toml). Its pose of the probe is the middle of the sweep.
+    #[arg(value_parser = common::scene_file())]
     scene: PathBuf,
     /// Path of the probe: linear:LENGTH along its elevation axis, tilt:ANGLE about its lateral axis,
     /// rotate:ANGLE about its depth axis, from the first frame to the last, e.g. linear:30mm or
@@ -34,7 +35,7 @@ pub struct Acquire {
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     frames: Option<u32>,
     /// Tracked frames to write (.mha, .nrrd), as PLUS and 3D Slicer read them.
-    #[arg(short, long, required_unless_present = "volume")]
+    #[arg(short, long)]
     output: Option<PathBuf>,
     /// Volume to reconstruct from them (.mha; .dcm: an Enhanced US Volume), along the axes of the probe at its middle
     /// frame.
@@ -142,7 +143,7 @@ fn writable(args: &Acquire) -> Result<()> {
             path.display()
         ));
     }
-    args.output.iter().chain(&args.volume).try_for_each(|path| common::in_folder(path))
+    args.output.iter().chain(&args.volume).try_for_each(|path| common::writable(path))
 }
 
 /// Runs the command.
@@ -150,6 +151,12 @@ fn writable(args: &Acquire) -> Result<()> {
 /// # Errors
 /// Every mistake of the user and every error of the device, reported once.
 pub fn run(args: &Acquire) -> Result<()> {
+    if args.output.is_none() && args.volume.is_none() {
+        return Err(miette!(
+            help = "give -o NAME.igs.mha for the tracked frames, --volume NAME.mha for the volume that they make, or both",
+            "nothing would be written"
+        ));
+    }
     writable(args)?;
     let mut scene = args.common.scene(&args.scene)?;
     let stations = stations(args, &scene)?;

@@ -14,6 +14,7 @@ use insonify::volume::{self, Format, Summary, Volume};
 pub struct Check {
     /// A scene (.toml), a mesh (.obj, .stl, .ply, .vtk, .vtp, .off, .3mf, .gltf, .glb) or a volume or
     /// sequence (.mha, .mhd, .nrrd, .nhdr, .nii, .nii.gz, .dcm)
+    #[arg(value_parser = super::common::scene_file())]
     file: PathBuf,
 }
 
@@ -39,7 +40,7 @@ impl Check {
 
     fn volume(&self) -> miette::Result<ExitCode> {
         let (volume, warnings) = Volume::load(&self.file).inspect_err(|_| {
-            output::line("1 errors, 0 warnings");
+            output::line(check::tally(1, 0));
         })?;
         output::line(self.file.display());
         output::line(&volume);
@@ -51,7 +52,7 @@ impl Check {
         for warning in &warnings {
             output::line(warning);
         }
-        output::line(format!("0 errors, {} warnings", warnings.len()));
+        output::line(check::tally(0, warnings.len()));
         Ok(ExitCode::SUCCESS)
     }
 }

@@ -1,18 +1,21 @@
 //! Arguments and actions common to all commands that simulate.
 
+use std::fs::OpenOptions;
 use std::io::{IsTerminal, stderr};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
+use clap::builder::{PathBufValueParser, TypedValueParser};
 use miette::{IntoDiagnostic, Report, Result, miette};
 
 use insonify::gpu::{Device, DeviceOptions, GpuError, cache_folder};
 use insonify::output;
 use insonify::output::dicom::Transducer;
+use insonify::output::files::{self, Draft};
 use insonify::probe::{Kind, Probe};
-use insonify::scene::Scene;
 use insonify::scene::file::{self, override_of};
+use insonify::scene::{Scene, shipped};
 use insonify::settings::{Quality, Simulation};
 use insonify::sim::calibration::Work;
 use insonify::sim::layout::Counters;
@@ -32,6 +35,9 @@ pub struct Common {
     /// Seed of every random number; replaces the scene's.
     #[arg(long)]
     pub seed: Option<u32>,
+    /// Puts the probe to a named pose of the scene file ([[pose]]).
+    #[arg(long, value_name = "NAME")]
+    pub pose: Option<String>,
     /// Tracer.
     #[arg(long, value_enum, default_value = "auto")]
     pub tracer: TracerChoice,
@@ -59,6 +65,11 @@ pub enum TracerChoice {
     RayQuery,
     /// Our BVH in a compute kernel; runs everywhere.
     Bvh,
+}
+
+/// Parser of a scene file on the command line: a path, or the name of a scene that ships.
+pub fn scene_file() -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().try_map(|path| shipped::find(&path))
 }
 
 /// A time on the command line, s.
@@ -116,11 +127,21 @@ impl Common {
         Ok(tracer)
     }
 
-    /// Overrides of the scene file at `path`: by `--paper`, and by `--set` after that.
-    pub fn overrides(&self, path: &Path) -> Vec<(String, String)> {
+    /// Overrides of the scene file at `path`: by `--paper` and `--pose`, and by `--set` after that.
+    ///
+    /// # Errors
+    /// The file has no such pose.
+    pub fn overrides(&self, path: &Path) -> Result<Vec<(String, String)>> {
         let selectors = self.tracer != TracerChoice::RayQuery;
-        let of_paper = self.paper.then(|| file::paper(path, selectors));
-        [of_paper.unwrap_or_default(), self.overrides.clone()].concat()
+        let mut all = match self.paper {
+            true => file::paper(path, selectors),
+            false => Vec::new(),
+        };
+        if let Some(name) = &self.pose {
+            all.push(file::named_pose(path, name)?);
+        }
+        all.extend(self.overrides.iter().cloned());
+        Ok(all)
     }
 
     /// Loads a scene with the overrides, and prints its warnings on standard error.
@@ -128,7 +149,7 @@ impl Common {
     /// # Errors
     /// The fault of the file.
     pub fn scene(&self, path: &Path) -> Result<Scene> {
-        let (scene, warnings) = Scene::load(path, &self.overrides(path))?;
+        let (scene, warnings) = Scene::load(path, &self.overrides(path)?)?;
         notes(&warnings);
         Ok(scene)
     }
@@ -170,20 +191,38 @@ pub fn notes<T: std::fmt::Display>(all: impl IntoIterator<Item = T>) {
     all.into_iter().for_each(output::note);
 }
 
-/// Refuses a file whose folder does not exist, before minutes of work for it.
+/// Makes the folder of a file that is to be written, and makes sure that the file can be, before minutes of work for it.
 ///
 /// # Errors
-/// There is no such folder.
-pub fn in_folder(path: &Path) -> Result<()> {
-    let folder = path.parent().filter(|f| !f.as_os_str().is_empty());
-    match folder.is_none_or(Path::is_dir) {
-        true => Ok(()),
-        false => Err(miette!(
-            help = "make the folder first",
-            "{} is not written: its folder does not exist",
+/// The folder cannot be made, or nothing can be written into it.
+pub fn writable(path: &Path) -> Result<()> {
+    let refused = |cause: String| {
+        miette!(
+            help = "name a file in a folder that you may write to",
+            "{} cannot be written: {cause}",
             path.display()
-        )),
+        )
+    };
+    if path.is_dir() {
+        return Err(refused("it is a folder".to_owned()));
     }
+    if let Some(folder) = path.parent() {
+        std::fs::create_dir_all(folder)
+            .map_err(|e| refused(format!("its folder cannot be made: {e}")))?;
+    }
+    let tried = match files::is_stream(path) {
+        true => OpenOptions::new().write(true).open(path).map(drop),
+        false => Draft::new(path).map(drop),
+    };
+    tried.map_err(|e| refused(e.to_string()))
+}
+
+/// Makes a folder that is to be written to, and makes sure that it can be.
+///
+/// # Errors
+/// Those of [`writable`].
+pub fn writable_folder(path: &Path) -> Result<()> {
+    writable(&path.join("-"))
 }
 
 /// Shape of the probe in the terms of DICOM.

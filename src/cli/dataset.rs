@@ -1,6 +1,6 @@
 //! `insonify dataset`: labelled samples by a plan, shard by shard.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
@@ -8,7 +8,7 @@ use miette::{IntoDiagnostic, Result, miette};
 
 use super::common::{self, Progress, TracerChoice};
 use insonify::dataset::{DatasetError, Made, Part, Plan, Run, Store, Told};
-use insonify::gpu::{Device, DeviceOptions, cache_folder};
+use insonify::gpu::{Device, DeviceOptions, cache_folder, peak_bytes};
 use insonify::output;
 use insonify::sim::Tracer;
 
@@ -94,6 +94,7 @@ pub fn run(args: &Dataset) -> Result<()> {
     };
     let mut log = Log::new(samples);
     let sheet = run.make(&device, wanted, &mut |store, told| log.told(store, told))?;
+    let rate = log.rate();
     log.progress.finish();
     output::line(format!(
         "{}: {} samples made, {} were there; {}",
@@ -102,6 +103,20 @@ pub fn run(args: &Dataset) -> Result<()> {
         log.kept,
         sheet.display()
     ));
+    let mega = |bytes: u64| bytes as f64 / 1e6;
+    let memory = peak_bytes().map_or(String::new(), |bytes| {
+        format!(
+            "; {:.0} MB of memory, and {:.0} MB on the device",
+            mega(bytes),
+            mega(device.memory().peak)
+        )
+    });
+    output::line(format!(
+        "{:.0} samples an hour; {:.1} MB in {}{memory}",
+        rate,
+        mega(held(&args.output)),
+        args.output.display()
+    ));
     let messages = device.validation_messages();
     match messages.first() {
         Some(first) if args.validate => {
@@ -109,6 +124,16 @@ pub fn run(args: &Dataset) -> Result<()> {
         }
         _ => Ok(()),
     }
+}
+
+/// Bytes of all files below a folder.
+fn held(folder: &Path) -> u64 {
+    let all = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let of = |entry: std::fs::DirEntry| match entry.path() {
+        path if path.is_dir() => held(&path),
+        _ => entry.metadata().map_or(0, |facts| facts.len()),
+    };
+    all.map(of).sum()
 }
 
 /// Says what a plan makes.
@@ -140,6 +165,12 @@ impl Log {
         Self { progress, begun: Instant::now(), made: 0, kept: 0, lost: Vec::new() }
     }
 
+    /// Samples made in an hour.
+    fn rate(&self) -> f64 {
+        let hours = self.begun.elapsed().as_secs_f64() / 3600.0;
+        f64::from(self.made) / hours.max(1e-9)
+    }
+
     fn told(&mut self, store: &Store<'_>, told: Told<'_>) -> Result<(), DatasetError> {
         match told {
             Told::Made(made) => {
@@ -148,12 +179,11 @@ impl Log {
             }
             Told::Kept => self.kept += 1,
             Told::Part(part) => {
-                let hours = self.begun.elapsed().as_secs_f64() / 3600.0;
-                let rate = f64::from(self.made) / hours.max(1e-9);
                 let count = part.samples.len();
                 output::line(format!(
-                    "{}: {count} samples, {rate:.0} an hour",
-                    store.part_name(part)
+                    "{}: {count} samples, {:.0} an hour",
+                    store.part_name(part),
+                    self.rate()
                 ));
             }
         }

@@ -1,7 +1,7 @@
 //! Names of the images of several frames.
 
 use std::fmt;
-use std::path::{Path, PathBuf};
+use std::path::{MAIN_SEPARATOR, Path, PathBuf};
 
 /// File names of a number of frames.
 #[derive(Debug)]
@@ -38,6 +38,21 @@ impl Images {
             Some((digits, after)) => format!("{before}{index:0digits$}{after}"),
             None => before.clone(),
         })
+    }
+}
+
+impl Images {
+    /// The file with what is said of all of them: their name without its number, as JSON.
+    pub fn sidecar(&self) -> PathBuf {
+        let Some((_, after)) = &self.numbered else {
+            return Path::new(&self.before).with_extension("json");
+        };
+        let before = self.before.trim_end_matches(['.', '-', '_']);
+        match before.is_empty() || before.ends_with(MAIN_SEPARATOR) {
+            true => PathBuf::from(format!("{before}frames.json")),
+            false if after.starts_with('.') => PathBuf::from(format!("{before}.json")),
+            false => PathBuf::from(format!("{before}{after}")).with_extension("json"),
+        }
     }
 }
 
@@ -98,6 +113,17 @@ mod tests {
         ] {
             let images = Images::new(Path::new(output), frames);
             assert_eq!(images.path(index), Path::new(expected), "{output}");
+        }
+        for (output, frames, expected) in [
+            ("out/a.png", 1, "out/a.json"),
+            ("out/a.png", 3, "out/a.json"),
+            ("out/a-%04d.png", 3, "out/a.json"),
+            ("a_{}.png", 1, "a.json"),
+            ("out/{}.png", 2, "out/frames.json"),
+            ("{}-a.png", 2, "frames.json"),
+        ] {
+            let images = Images::new(Path::new(output), frames);
+            assert_eq!(images.sidecar(), Path::new(expected), "{output}");
         }
         let images = Images::new(Path::new("a.png"), 2);
         assert_eq!(images.to_string(), "a.0000.png to a.0001.png");

@@ -20,14 +20,15 @@ mod table;
 #[derive(Debug, Args)]
 pub struct Match {
     /// Scene file (.toml) with [volume] and [fusion]; its [imaging] is fitted.
+    #[arg(value_parser = common::scene_file())]
     scene: PathBuf,
-    /// Scene file to write [default: SCENE itself].
+    /// Scene file to write [default: none; what would be set is printed].
     #[arg(short, long)]
     output: Option<PathBuf>,
-    /// Says what would be set and writes nothing.
+    /// Writes into SCENE itself.
     #[arg(long, conflicts_with = "output")]
-    dry_run: bool,
-    /// Width of the bands inside and outside the mask's border that are compared, mm.
+    in_place: bool,
+    /// Width of the band around the mask that is compared, mm.
     #[arg(long, default_value_t = 4.0, value_parser = band)]
     band: f64,
     /// Settings to be fitted.
@@ -65,8 +66,12 @@ fn band(text: &str) -> Result<f64, String> {
 /// Runs the command.
 ///
 /// # Errors
-/// Every mistake of the user and every error of the device, reported once; the scene file is then untouched.
+/// Every mistake of the user and every error of the device, reported once; settings that no scanner would have. The
+/// scene file is then untouched.
 pub fn run(args: &Match) -> Result<()> {
+    if let Some(output) = &args.output {
+        common::writable(output)?;
+    }
     let mut scene = args.common.scene(&args.scene)?;
     let device = args.common.device()?;
     let tracer = args.common.tracer(&device, &scene)?;
@@ -103,16 +108,19 @@ pub fn run(args: &Match) -> Result<()> {
     for note in &made.notes {
         output::note(format!("warning: {note}"));
     }
-    if !made.settled {
-        output::note(format!(
-            "warning: not settled after {} rounds; match again, or fit less with --fit",
-            made.rounds
+    if !made.faults.is_empty() {
+        return Err(miette!(
+            help = "nothing is set. Does the scene have the tissue around the mask that the volume shows there? \
+                    Else fit less (--fit gain), widen --band, or start from other settings (--set imaging.gain=...)",
+            "{} is not matched by plausible settings of a scanner: {}",
+            args.scene.display(),
+            made.faults.join("; ")
         ));
     }
     write(args, &made)
 }
 
-/// Writes the changes, unless there is none and no other file is wanted.
+/// Prints the changes, and writes them where that is asked for.
 fn write(args: &Match, made: &Matching) -> Result<()> {
     let settings = settings(made, &args.common.overrides);
     for (path, value) in settings.iter().filter_map(|(p, v)| Some((p, v.as_ref()?))) {
@@ -121,10 +129,17 @@ fn write(args: &Match, made: &Matching) -> Result<()> {
     if settings.is_empty() {
         output::line("matched already: nothing to set");
     }
-    if args.dry_run || (settings.is_empty() && args.output.is_none()) {
-        return Ok(());
-    }
-    let output = args.output.as_ref().unwrap_or(&args.scene);
+    let output = match (&args.output, args.in_place) {
+        (Some(output), _) => output,
+        (None, true) if settings.is_empty() => return Ok(()),
+        (None, true) => &args.scene,
+        (None, false) => {
+            output::note(
+                "nothing is written; -o FILE writes a scene file with these settings, --in-place this one",
+            );
+            return Ok(());
+        }
+    };
     save(&args.scene, output, &settings)?;
     output::line(output.display());
     Ok(())

@@ -11,7 +11,7 @@ use insonify::volume::{
 };
 use miette::{Context, Result};
 
-use super::common::notes;
+use super::common::{notes, writable};
 
 /// Arguments of `insonify reconstruct`. What is given here goes before the configuration.
 #[derive(Debug, Args)]
@@ -22,7 +22,8 @@ pub struct Reconstruct {
     /// VolumeReconstruction.
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// Calibration from pixels to the probe's tracked frame, mm: 16 numbers, row by row.
+    /// Calibration from pixels to the probe's tracked frame, mm: 16 numbers, row by row. Replaces the sequence's own
+    /// and the configuration's.
     #[arg(long, value_name = "MATRIX", value_parser = matrix, allow_hyphen_values = true)]
     image_to_probe: Option<DAffine3>,
     /// Name of the frame of pixels [default: the configuration's, or Image].
@@ -100,7 +101,8 @@ fn clip(text: &str) -> Result<[i32; 4], String> {
 /// # Errors
 /// Every fault of files and settings, reported once.
 pub fn run(args: &Reconstruct) -> Result<()> {
-    let (sequence, warnings) = Sequence::load(&args.sequence)?;
+    writable(&args.output)?;
+    let (mut sequence, warnings) = Sequence::load(&args.sequence)?;
     notes(&warnings);
     let config = args.config.as_deref().map(Config::load).transpose()?;
     let mut config = config.unwrap_or_else(|| Config {
@@ -115,6 +117,11 @@ pub fn run(args: &Reconstruct) -> Result<()> {
     let reference = reference.unwrap_or("Reference").to_owned();
     if let Some(matrix) = args.image_to_probe {
         config.transforms = Transforms::default();
+        // What the sequence itself says of its pixels goes before a configuration, and not before this.
+        let (from, to) = (format!("{image}To"), format!("To{image}"));
+        for frame in &mut sequence.frames {
+            frame.poses.retain(|name, _| !name.starts_with(&from) && !name.ends_with(&to));
+        }
         config.transforms.add(&image, "Probe", matrix);
     }
     let settings = &mut config.settings;

@@ -12,7 +12,7 @@ use insonify::scene::{Acquired, Scene};
 use insonify::volume::Frame;
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
 
-use super::common::{notes, seconds};
+use super::common::{notes, seconds, writable};
 
 mod inputs;
 mod told;
@@ -24,6 +24,7 @@ mod told;
 #[command(group = ArgGroup::new("destination").args(["output", "in_place", "dry_run"]))]
 pub struct Register {
     /// Scene file (.toml) with [volume].
+    #[arg(value_parser = super::common::scene_file())]
     scene: PathBuf,
     /// The model's surface: the name of a mesh of the scene, or a mesh file in its world. May be given
     /// several times.
@@ -108,6 +109,7 @@ struct Registered {
 /// # Errors
 /// Every mistake of the user, reported once; the scene file is then untouched.
 pub fn run(args: &Register) -> Result<()> {
+    args.output.iter().chain(&args.json).try_for_each(|path| writable(path))?;
     let (mut scene, found) = Scene::load(&args.scene, &[])?;
     notes(&found);
     scene.set_time(args.time);

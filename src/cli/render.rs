@@ -3,28 +3,28 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use glam::DAffine3;
 use miette::{Context, IntoDiagnostic, Result, miette};
 use serde_json::{Map, Value, json};
 
 use super::common::{self, Common, Progress};
-use insonify::acquire::{self, Station};
-use insonify::gpu::FrameTimings;
+use insonify::gpu::{Device, FrameTimings, peak_bytes};
 use insonify::output;
 use insonify::scene::{Scene, file};
-use insonify::settings::ScatterMode;
+use insonify::settings::{Group as _, ScatterMode, Simulation};
 use insonify::sim::calibration::Calibration;
 use insonify::sim::dump;
 use insonify::sim::facts;
 use insonify::sim::shaders::Library;
-use insonify::sim::{Simulator, Tracer};
+use insonify::sim::{Shot, Simulator, Tracer};
 use insonify::statistics::Statistics;
 
 mod film;
 mod labels;
+mod moments;
 
 use film::Film;
 use labels::LabelFiles;
+use moments::{Moment, groups, moments, pace};
 
 /// Frames per second of an animation whose scene time stands still.
 const SHOWN: f64 = 10.0;
@@ -32,13 +32,16 @@ const SHOWN: f64 = 10.0;
 /// Arguments of `insonify render`.
 #[derive(Debug, clap::Args)]
 pub struct Render {
-    /// Scene file (.toml).
+    /// Scene file (.toml), or the name of a scene that ships.
+    #[arg(value_parser = common::scene_file())]
     scene: PathBuf,
-    /// Image to write (PNG, 8-bit grey) [default: the scene's name with .png, here]. With several
+    /// Image to write (PNG, 8-bit grey, with the size of a pixel) [default: the scene's name with .png, here]; its
+    /// folder is made. NAME.json beside it says settings, pose, time and place of its pixels. With several
     /// frames NAME.png becomes NAME.0000.png, NAME.0001.png, ...; `{}` or `%04d` in the name says
     /// where the number goes. NAME.gif is an animation of all frames, played again and again. NAME.dcm is a loop in
     /// DICOM, with the size of a pixel. NAME.seq.mha and NAME.seq.nrrd are loops with the probe's pose at each frame,
-    /// for 3D Slicer and PLUS.
+    /// for 3D Slicer and PLUS. NAME.uff has IQ and RF of all frames for USTB. NAME.hdf5 is a file of zea: images, poses,
+    /// envelope, IQ and RF; with --set simulation.labels=true also the segmentation and every label of the pixels.
     #[arg(short, long)]
     output: Option<PathBuf>,
     /// Frames to simulate; each is written, timings are over all. --dump takes the last. [default: 1;
@@ -93,12 +96,21 @@ fn rate(text: &str) -> Result<f64, String> {
 /// Every mistake of the user and every error of the device, reported once.
 pub fn run(args: &Render) -> Result<()> {
     let output = args.output.clone().unwrap_or_else(|| default_output(&args.scene));
-    film::check(&output)?;
+    if let Some(dir) = &args.dump {
+        common::writable_folder(dir)?;
+    }
+    if let Some(json) = &args.json {
+        common::writable(json)?;
+    }
     let mut scene = args.common.scene(&args.scene)?;
+    let moments = moments(args, &scene)?;
+    let frames = u32::try_from(moments.len()).expect("no more than can be asked for");
+    film::check(&output, frames)?;
     if let Some(labels) = &args.labels {
-        labels::check(labels, &scene)?;
+        labels::check(labels, frames, &scene)?;
         scene.simulation.labels = true;
     }
+    let of_file = scene.simulation.clone();
     let device = args.common.device()?;
     let tracer = args.common.tracer(&device, &scene)?;
     args.common.settle(&mut scene, &device);
@@ -108,7 +120,9 @@ pub fn run(args: &Render) -> Result<()> {
     let mut simulator = common::simulator(&device, &library, &scene, tracer)?;
     let build_ms = loaded.elapsed().as_secs_f64() * 1e3;
 
-    let timings = simulate(&mut simulator, &mut library, &mut scene, args, &output)?;
+    let said = said(args, &scene, &of_file, &device, tracer)?;
+    let (timings, said) =
+        simulate(&mut simulator, &mut library, &mut scene, args, &output, moments, said)?;
     if let Some(dir) = &args.dump {
         dump::frame(&mut simulator, &scene, dir).into_diagnostic()?;
     }
@@ -125,18 +139,14 @@ pub fn run(args: &Render) -> Result<()> {
     let messages = device.validation_messages();
     if let Some(file) = &args.json {
         let memory = device.memory();
-        let report = json!({
-            "scene": args.scene.display().to_string(),
-            "settings": facts::settings(&scene),
-            "device": { "name": device.name(), "driver": device.driver(), "api": device.api_version() },
-            "tracer": tracer.to_string(),
+        let mut report = said;
+        let figures = json!({
             "triangles": scene.triangles(),
-            "time_s": args.common.time,
             "fps": args.fps,
             "build_ms": build_ms,
             "stages_ms": stage_statistics(&timings),
             "frame_ms": Statistics::of(timings.iter().map(FrameTimings::total_ms)),
-            "memory": { "host_peak_bytes": host_peak_bytes(), "device_peak_bytes": memory.peak },
+            "memory": { "host_peak_bytes": peak_bytes(), "device_peak_bytes": memory.peak },
             "counters": {
                 "rays": counters.rays, "interactions": counters.interactions, "segments": counters.segments,
                 "candidates": counters.candidates, "deposits": counters.deposits,
@@ -151,12 +161,39 @@ pub fn run(args: &Render) -> Result<()> {
             "saturated_samples": counters.saturated,
             "validation_messages": messages,
         });
+        report.extend(figures.as_object().expect("made as one").clone());
         let text = serde_json::to_string_pretty(&report).into_diagnostic()? + "\n";
         std::fs::write(file, text)
             .into_diagnostic()
             .wrap_err_with(|| format!("writing {}", file.display()))?;
     }
     args.common.validated(&device)
+}
+
+/// What is said of all frames beside the pictures and in them. Under `set` stands what of the scene file to replace to
+/// get them again.
+fn said(
+    args: &Render,
+    scene: &Scene,
+    of_file: &Simulation,
+    device: &Device,
+    tracer: Tracer,
+) -> Result<Map<String, Value>> {
+    let settled = file::changes(of_file, &scene.simulation, Simulation::TABLE).into_iter();
+    let set = args.common.overrides(&args.scene)?.into_iter();
+    let set = set.map(|(path, value)| (path, Some(value))).chain(settled);
+    let set: Map<String, Value> = set.map(|(path, value)| (path, value.into())).collect();
+    let said = json!({
+        "program": concat!("insonify ", env!("CARGO_PKG_VERSION")),
+        "scene": scene.name,
+        "scene_file": args.scene.display().to_string(),
+        "device": { "name": device.name(), "driver": device.driver(), "api": device.api_version() },
+        "tracer": tracer.to_string(),
+        "time_s": args.common.time,
+        "set": set,
+        "settings": facts::settings(scene),
+    });
+    Ok(said.as_object().expect("made as one").clone())
 }
 
 /// Scatterers per resolution cell over depth, of the tissue with most; none in voxel mode.
@@ -228,99 +265,58 @@ fn reload(simulator: &mut Simulator, library: &mut Library) {
 #[cfg(not(feature = "compile"))]
 fn reload(_: &mut Simulator, _: &mut Library) {}
 
-/// Time and pose of a frame.
-struct Moment {
-    /// Time of the scene, s.
-    seconds: f64,
-    /// World from probe, where a trajectory gives it.
-    pose: Option<DAffine3>,
-}
-
-/// Times and poses of all frames.
-fn moments(args: &Render, scene: &Scene) -> Result<Vec<Moment>> {
-    let start = args.common.time;
-    let Some(path) = &args.trajectory else {
-        let gone = |index| args.fps.map_or(0.0, |fps| f64::from(index) / fps);
-        let moment = |index| Moment { seconds: start + gone(index), pose: None };
-        return Ok((0..args.frames.unwrap_or(1)).map(moment).collect());
-    };
-    let track = file::load_trajectory(path)?;
-    let few = |frames: f64| match frames <= 100_000.0 {
-        true => Ok(frames as u32),
-        false => Err(miette!(
-            help = "give --frames or a lower --fps",
-            "{} makes {frames} frames; at most 100000 are rendered",
-            path.display()
-        )),
-    };
-    let stations = match args.fps {
-        Some(fps) => {
-            let frames = args.frames.map_or_else(|| acquire::poses_at(&track, fps), f64::from);
-            acquire::stations_at(&track, scene, fps, few(frames)?)
-        }
-        None => acquire::stations_of(&track, scene, args.frames),
-    };
-    few(stations.len() as f64)?;
-    let first = stations[0].time;
-    let moment = |station: &Station| Moment {
-        seconds: start + station.time - first,
-        pose: Some(station.world_from_probe),
-    };
-    Ok(stations.iter().map(moment).collect())
-}
-
-/// Mean frames per second of a trajectory's rows.
-fn pace(args: &Render, moments: &[Moment]) -> Option<f64> {
-    args.trajectory.as_ref()?;
-    let (first, last) = (moments.first()?, moments.last()?);
-    let seconds = last.seconds - first.seconds;
-    (seconds > 0.0).then(|| (moments.len() - 1) as f64 / seconds)
-}
-
-/// Simulates all frames and writes each as an image; returns the device's timings of each. The scene's time
-/// is then that of the last frame.
+/// Simulates all frames and writes each as an image; returns the device's timings of each, and what is `said` of them.
+/// The scene's time is then that of the last frame.
 fn simulate(
     simulator: &mut Simulator,
     library: &mut Library,
     scene: &mut Scene,
     args: &Render,
     output: &Path,
-) -> Result<Vec<FrameTimings>> {
-    let moments = moments(args, scene)?;
-    let frames = u32::try_from(moments.len()).expect("no more than can be asked for");
+    moments: Vec<Moment>,
+    said: Map<String, Value>,
+) -> Result<(Vec<FrameTimings>, Map<String, Value>)> {
+    let frames = moments.len() as u32;
     let shown = args.fps.or_else(|| pace(args, &moments)).unwrap_or(SHOWN);
-    let mut film = Film::new(output, simulator, scene, &moments, shown)?;
+    let mut film = Film::new(output, simulator, scene, &moments, shown, said)?;
     let labels = args.labels.as_ref().map(|path| LabelFiles::new(path, frames)).transpose()?;
     let mut progress = Progress::new(frames, "frames");
     let mut timings = Vec::new();
     let mut unseen = scene.masks_off_the_image();
-    for (index, moment) in (0..).zip(moments) {
+    for group in groups(&moments, scene, simulator.most_shots()) {
         reload(simulator, library);
-        if let Some(pose) = moment.pose {
-            scene.world_from_probe = pose;
+        scene.set_time(moments[group.start].seconds);
+        let mut shots = Vec::new();
+        for index in group.clone() {
+            scene.world_from_probe = moments[index].pose.unwrap_or(scene.world_from_probe);
+            if index > 0 && !unseen.is_empty() {
+                let still = scene.masks_off_the_image();
+                unseen.retain(|mask| still.contains(mask));
+            }
+            shots.push(Shot::of(scene, index as u32));
         }
-        scene.set_time(moment.seconds);
-        if index > 0 && !unseen.is_empty() {
-            let still = scene.masks_off_the_image();
-            unseen.retain(|mask| still.contains(mask));
+        simulator.frames(scene, &shots).into_diagnostic()?;
+        for (place, (index, shot)) in group.zip(&shots).enumerate() {
+            simulator.choose(place);
+            scene.world_from_probe = shot.world_from_probe;
+            film.add(index as u32, simulator, scene)?;
+            if let Some(labels) = &labels {
+                labels.add(index as u32, simulator, scene)?;
+            }
+            progress.done(index as u32 + 1);
         }
-        timings.extend(simulator.frame(scene, index).into_diagnostic()?);
-        film.add(index, simulator, scene)?;
-        if let Some(labels) = &labels {
-            labels.add(index, simulator, scene)?;
-        }
-        progress.done(index + 1);
+        let took = simulator.wait().into_diagnostic()?.pop().unwrap_or_default();
+        timings.extend(vec![took.of_each(shots.len()); shots.len()]);
     }
     for mask in unseen {
         output::note(format!("warning: {}", common::unseen(scene, mask)));
     }
-    timings.extend(simulator.wait().into_diagnostic()?);
     progress.finish();
-    film.finish(output)?;
+    let said = film.finish(output, args.json.as_deref())?;
     if let Some(labels) = labels {
         labels.finish();
     }
-    Ok(timings)
+    Ok((timings, said))
 }
 
 fn default_output(scene: &Path) -> PathBuf {
@@ -341,12 +337,4 @@ fn stage_statistics(timings: &[FrameTimings]) -> Map<String, Value> {
         }
     }
     stages.into_iter().map(|(name, ms)| (name, json!(Statistics::of(ms)))).collect()
-}
-
-/// Largest resident size of this process so far, where the system tells it.
-fn host_peak_bytes() -> Option<u64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
-    let kib: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
-    Some(kib * 1024)
 }

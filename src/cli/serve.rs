@@ -10,13 +10,15 @@ use glam::DAffine3;
 use miette::{IntoDiagnostic, Result, miette};
 
 use super::common::{self, Common};
-use insonify::gpu::Device;
-use insonify::igtl::{self, Picture, Server, Status, TrackerState};
+use insonify::igtl::{self, Order, Picture, Server, Status, TrackerState};
 use insonify::live::{self, Level, Pace};
 use insonify::output;
 use insonify::scene::Scene;
-use insonify::sim::shaders::Library;
-use insonify::sim::{self, Simulator};
+use insonify::sim;
+
+mod session;
+
+use session::Session;
 
 /// Pause where nothing has changed: a tracker sends 30 to 100 poses a second.
 const REST: Duration = Duration::from_millis(3);
@@ -27,6 +29,7 @@ const TOLD: Duration = Duration::from_secs(1);
 #[derive(Debug, clap::Args)]
 pub struct Serve {
     /// Scene file (.toml). Its [tracker] says which tool moves the probe.
+    #[arg(value_parser = common::scene_file())]
     scene: PathBuf,
     /// Port for OpenIGTLink; 0 takes any that is free, and says which.
     #[arg(long, value_name = "PORT", default_value_t = igtl::PORT)]
@@ -58,23 +61,17 @@ fn rate(text: &str) -> Result<f64, String> {
 /// # Errors
 /// Every mistake of the user and every error of the device, reported once.
 pub fn run(args: &Serve) -> Result<()> {
-    let common = &args.common;
-    let mut scene = common.scene(&args.scene)?;
-    let device = common.device()?;
-    common.settle(&mut scene, &device);
-    let tracer = common.tracer(&device, &scene)?;
-    let library = Library::embedded();
-    let mut simulator = common::simulator(&device, &library, &scene, tracer)?;
+    let mut session = Session::new(args)?;
     let address = SocketAddr::new(args.igtl_bind, args.igtl_port);
-    let settings = igtl::ServerSettings::new(scene.tracker.clone());
+    let settings = igtl::ServerSettings::new(session.scene.tracker.clone());
     let server = Server::bind(address, settings)
         .map_err(|error| miette!(help = error.remedy(), "{error}"))?;
     if !args.igtl_bind.is_loopback() {
         output::note(format!("warning: {}", igtl::OPEN));
     }
     output::line(format!("listening at {} (OpenIGTLink)", server.address()));
-    simulate(&mut simulator, &mut scene, &device, &server, args)?;
-    common.validated(&device)
+    simulate(&mut session, &server, args)?;
+    args.common.validated(&session.device)
 }
 
 /// The last image: its state of the scene, and its level of quality.
@@ -84,26 +81,31 @@ struct Shown {
     at: Instant,
 }
 
-/// Makes an image whenever probe or anatomy have moved, at a level of quality that keeps the budget, and
-/// finer ones once they rest; offers them to the clients.
-fn simulate(
-    simulator: &mut Simulator,
-    scene: &mut Scene,
-    device: &Device,
-    server: &Server,
-    args: &Serve,
-) -> Result<()> {
-    let began = Instant::now();
+/// Makes an image whenever probe, anatomy or settings have changed, at a level of quality that keeps the budget, and
+/// finer ones once they rest; offers them to the clients, and carries out what they order.
+fn simulate(session: &mut Session, server: &Server, args: &Serve) -> Result<()> {
     let pause = Duration::from_secs_f64(1.0 / args.fps);
     let mut told = Told::default();
-    let mut pace = Pace::new(sim::machine(device));
-    let own = Level::of(scene);
+    let mut pace = Pace::new(sim::machine(&session.device));
     let mut shown: Option<Shown> = None;
     let mut frames = 0;
-    let mut due = began;
+    let mut due = Instant::now();
     loop {
         told.tell(server);
-        scene.set_time(args.common.time + began.elapsed().as_secs_f64());
+        while let Some(request) = server.request() {
+            let outcome = session.carry_out(&request.order, server);
+            if outcome.is_ok() && !matches!(request.order, Order::Get(_)) {
+                shown = None;
+            }
+            request.answer(outcome);
+        }
+        if session.is_frozen() {
+            thread::sleep(REST);
+            continue;
+        }
+        let seconds = session.seconds();
+        let scene = &mut session.scene;
+        scene.set_time(seconds);
         if let Some(pose) = server.pose().pose() {
             scene.world_from_probe = pose.world_from_probe;
         }
@@ -117,6 +119,7 @@ fn simulate(
         }
         let start = Instant::now();
         due = start + pause;
+        let own = Level::of(scene);
         let level = finer.unwrap_or_else(|| pace.moving(scene));
         pace.apply(level, scene);
         // The scene's own image at rest is that of `render`.
@@ -124,6 +127,7 @@ fn simulate(
             (0, Some(_)) => 0,
             _ => frames,
         };
+        let simulator = &mut session.simulator;
         simulator.frame(scene, noise).into_diagnostic()?;
         let (_, _, rgba) = simulator.pixels().into_diagnostic()?;
         own.apply(scene);

@@ -22,6 +22,7 @@ mod record;
 #[derive(Debug, Args)]
 pub struct Vary {
     /// Scene file (.toml); its table [vary] says which parameters take which values.
+    #[arg(value_parser = common::scene_file())]
     scene: PathBuf,
     /// The sheet, NAME.png, with its table beside it, NAME.csv; or a folder for both and every single
     /// image [default: the scene's name and what is shown, here].
@@ -71,8 +72,9 @@ impl fmt::Display for Show {
 /// Every mistake of the user and every error of the device, reported once.
 pub fn run(args: &Vary) -> Result<()> {
     let common = &args.common;
+    let files = Files::new(args)?;
     let (mut scene, variants, warnings) =
-        Scene::load_variants(&args.scene, &common.overrides(&args.scene))?;
+        Scene::load_variants(&args.scene, &common.overrides(&args.scene)?)?;
     common::notes(&warnings);
     if args.show != Show::Parameters && scene.volume.is_none() {
         return Err(miette!(
@@ -82,7 +84,6 @@ pub fn run(args: &Vary) -> Result<()> {
             args.show
         ));
     }
-    let files = Files::new(args)?;
     let device = common.device()?;
     let tracer = common.tracer(&device, &scene)?;
     common.settle(&mut scene, &device);
@@ -121,11 +122,10 @@ impl Files {
         let output = args.output.clone().unwrap_or_else(named);
         let png = |e: &std::ffi::OsStr| e.eq_ignore_ascii_case("png");
         if output.extension().is_some_and(png) {
+            common::writable(&output)?;
             return Ok(Self { table: output.with_extension("csv"), sheet: output, folder: None });
         }
-        std::fs::create_dir_all(&output)
-            .into_diagnostic()
-            .wrap_err_with(|| format!("making the folder {}", output.display()))?;
+        common::writable_folder(&output)?;
         Ok(Self {
             sheet: output.join("sheet.png"),
             table: output.join("sheet.csv"),

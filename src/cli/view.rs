@@ -6,7 +6,9 @@ use std::sync::Arc;
 
 use miette::{IntoDiagnostic, Result};
 
-use super::common::Common;
+use super::common::{self, Common};
+use insonify::output;
+use insonify::scene::Scene;
 use insonify::scene::animation::Track;
 use insonify::scene::file;
 use insonify::sim::shaders::Library;
@@ -15,9 +17,12 @@ use insonify::view::{self, Listen, Options};
 /// Arguments of `insonify view`.
 #[derive(Debug, clap::Args)]
 pub struct View {
-    /// Scene file (.toml).
-    #[arg(default_value = "scenes/abdomen.toml")]
+    /// Scene file (.toml), or the name of a scene that ships.
+    #[arg(value_parser = common::scene_file(), default_value = "abdomen")]
     scene: PathBuf,
+    /// Begins with pictures of the scenes that ship, to choose one.
+    #[arg(long)]
+    gallery: bool,
     #[command(flatten)]
     common: Common,
     /// Lets the probe go along a trajectory (.csv, .toml) from the start: one that the window has
@@ -59,11 +64,16 @@ fn scale(text: &str) -> Result<f32, String> {
 /// # Errors
 /// Everything that the user or the device can get wrong, said once.
 pub fn run(args: &View) -> Result<()> {
-    let scene = args.common.scene(&args.scene)?;
+    args.screenshot.iter().chain(&args.json).try_for_each(|path| common::writable(path))?;
+    let trajectory = trajectory(args)?;
     let common = args.common.clone();
+    let overrides = common.overrides(&args.scene)?;
+    let (scene, warnings) = Scene::load(&args.scene, &overrides)?;
+    common::notes(&warnings);
     let options = Options {
         file: args.scene.clone(),
-        overrides: common.overrides(&args.scene),
+        warnings: warnings.iter().map(ToString::to_string).collect(),
+        overrides,
         // Both tracers: the console exchanges them.
         device: common.device_options(),
         library: Arc::new(Library::embedded()),
@@ -71,14 +81,18 @@ pub fn run(args: &View) -> Result<()> {
         scale: args.scale,
         screenshot: args.screenshot.clone(),
         json: args.json.clone(),
-        trajectory: trajectory(args)?,
+        trajectory,
         listen: args.igtl_port.map(|port| Listen { address: args.igtl_bind, port }),
         captures: args.captures.clone(),
+        gallery: args.gallery,
         prepare: Box::new(move |device, scene| {
             common.settle_simulation(&mut scene.simulation, device);
             Ok(common.tracer(device, scene)?)
         }),
     };
+    for line in view::FIRST_STEPS {
+        output::note(line);
+    }
     view::run(scene, options).into_diagnostic()
 }
 

@@ -1,12 +1,13 @@
 //! The files of a sample: image, segmentation, arrays, and what was drawn.
 
-use glam::{DAffine3, DQuat};
+use glam::DAffine3;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder as _};
 use serde_json::{Map, Value, json};
 
 use super::plan::{Array, Plan};
 use super::studio::Made;
+use crate::exchange::wxyz;
 use crate::output::indexed::{self, NOTHING};
 use crate::output::npy::{self, Element};
 use crate::scene::file::stated_pose;
@@ -48,8 +49,12 @@ fn npy(array: Array, made: &Made) -> Vec<u8> {
             let values = made.iq.as_deref().expect(asked);
             (Element::Float, vec![lines, samples, 2], bytemuck::cast_slice(values))
         }
-        Array::Label(name) => {
-            let label = made.labels.iter().find(|label| label.kind.name == name).expect(asked);
+        Array::Rf => {
+            let values = made.rf.as_deref().expect(asked);
+            (Element::Float, vec![lines, values.len() / lines], bytemuck::cast_slice(values))
+        }
+        Array::Label(kind) => {
+            let label = made.labels.iter().find(|label| label.kind == kind).expect(asked);
             let (element, bytes) = match &label.values {
                 LabelValues::Indices(values) => (Element::Integer, bytemuck::cast_slice(values)),
                 LabelValues::Quantities(values) => (Element::Float, bytemuck::cast_slice(values)),
@@ -146,13 +151,6 @@ fn value_of(text: &str) -> Value {
 fn rows(place: &DAffine3) -> Value {
     let m = glam::DMat4::from(*place);
     json!([m.row(0).to_array(), m.row(1).to_array(), m.row(2).to_array(), m.row(3).to_array()])
-}
-
-/// The rotation as a quaternion whose real part comes first and is not below 0.
-pub(super) fn wxyz(place: &DAffine3) -> [f64; 4] {
-    let q = DQuat::from_mat3(&place.matrix3).normalize();
-    let sign = if q.w < 0.0 { -1.0 } else { 1.0 };
-    [q.w, q.x, q.y, q.z].map(|v| sign * v)
 }
 
 #[cfg(test)]

@@ -17,7 +17,7 @@ use crate::scene::file::{SceneFile, Source};
 use crate::scene::{SceneError, Warning};
 use crate::settings::units::DURATION;
 use crate::settings::{Facts, Quality};
-use crate::sim::labels::KINDS;
+use crate::sim::labels::{KINDS, LabelKind};
 
 /// Largest plan, bytes.
 const MAX_PLAN: u64 = 4 << 20;
@@ -36,9 +36,9 @@ pub enum Format {
     Folder,
     /// Archives of the same files, one of each part: `train-000007.tar`.
     WebDataset,
-    /// Files of zea (HDF5), one a sample: image, segmentation, pose, and of the plan's arrays envelope and IQ.
+    /// Files of zea (HDF5), one a sample: image, segmentation, pose, and the plan's arrays.
     Zea,
-    /// Files of UFF (HDF5), one a sample: beamformed baseband on its scan.
+    /// Files of UFF (HDF5), one a sample: beamformed baseband on its scan, and radio frequency where the plan asks for it.
     Uff,
 }
 
@@ -58,21 +58,23 @@ impl Format {
 }
 
 /// An array beside the image.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Array {
     /// Envelope after TGC, relative to a perfect mirror: [scanline, sample].
     Envelope,
     /// Complex baseband before TGC: [scanline, sample, real and imaginary].
     Iq,
-    /// Labels of the image's pixels, by their name in [`KINDS`]: [row, column], some of them with three numbers each.
-    Label(&'static str),
+    /// Radio-frequency lines before TGC, several samples to each axial one: [scanline, sample].
+    Rf,
+    /// Labels of the image's pixels: [row, column], some of them with three numbers each.
+    Label(&'static LabelKind),
 }
 
 impl Array {
     /// All that a plan may name. What has moved since the last frame is not among them: a sample has no last frame.
     pub fn all() -> impl Iterator<Item = Self> + Clone {
-        let labels = KINDS.iter().map(|kind| kind.name).filter(|name| *name != "displacement");
-        [Self::Envelope, Self::Iq].into_iter().chain(labels.map(Self::Label))
+        let labels = KINDS.iter().filter(|kind| kind.name != "displacement");
+        [Self::Envelope, Self::Iq, Self::Rf].into_iter().chain(labels.map(Self::Label))
     }
 
     /// Its name in plans and in names of files.
@@ -80,7 +82,8 @@ impl Array {
         match self {
             Self::Envelope => "envelope",
             Self::Iq => "iq",
-            Self::Label(name) => name,
+            Self::Rf => "rf",
+            Self::Label(kind) => kind.name,
         }
     }
 }

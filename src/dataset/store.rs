@@ -298,8 +298,8 @@ impl<'p> Store<'p> {
         files: &'f [Vec<u8>],
     ) -> Cow<'f, [u8]> {
         match format {
-            Format::Zea => exchange::zea(self.plan, made).into(),
-            Format::Uff => exchange::uff(self.plan, made).into(),
+            Format::Zea => exchange::bytes(self.plan, made, crate::exchange::Format::Zea).into(),
+            Format::Uff => exchange::bytes(self.plan, made, crate::exchange::Format::Uff).into(),
             Format::Folder | Format::WebDataset => {
                 let place = self.extensions.iter().position(|e| e == extension);
                 files[place.expect("one of its files")][..].into()

@@ -40,6 +40,8 @@ pub struct Made {
     pub envelope: Option<Vec<f32>>,
     /// Complex pairs of the baseband before TGC, [scanline, sample]; where the plan asks for it or writes UFF.
     pub iq: Option<Vec<f32>>,
+    /// Radio-frequency lines before TGC, [scanline, sample]; where the plan asks for them.
+    pub rf: Option<Vec<f32>>,
     /// Labels of the image's pixels; those for which the plan asks, in its order.
     pub labels: Vec<LabelArray>,
     /// Losses of the frame.
@@ -107,6 +109,8 @@ impl<'p> Studio<'p> {
         }
         let scene = &mut stage.scene;
         scene.simulation.labels = true;
+        let levels = |array: &Array| matches!(array, Array::Label(kind) if kind.is_of_level());
+        scene.simulation.label_levels = plan.arrays.iter().any(levels);
         scene.simulation.seed = sample.seed;
         if let Some(quality) = plan.quality {
             let by_hand = sample.entries.iter().map(|(path, _)| path.as_str());
@@ -169,6 +173,10 @@ fn made(
         let pairs = iq.chunks_exact(2).enumerate();
         pairs.map(|(i, z)| (z[0] * z[0] + z[1] * z[1]).sqrt() * rows[i % samples].tgc).collect()
     });
+    let rf = match wants(Array::Rf) {
+        true => Some(simulator.rf(&scene.probe)?.1),
+        false => None,
+    };
     Ok(Made {
         settings: scene.settings.clone(),
         world_from_probe: scene.world_from_probe,
@@ -180,6 +188,7 @@ fn made(
         contact: simulator.contact(),
         envelope,
         iq: keeps.then_some(iq),
+        rf,
         counters: simulator.counters()?,
         sample,
     })
@@ -204,7 +213,7 @@ fn wanted(plan: &Plan, pixels: &LabelGrid) -> Vec<LabelArray> {
         .arrays
         .iter()
         .filter_map(|array| match array {
-            Array::Label(name) => Some(*name),
+            Array::Label(kind) => Some(kind.name),
             _ => None,
         })
         .collect();

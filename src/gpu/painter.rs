@@ -24,8 +24,37 @@ use super::swapchain::{AcquireResult, Swapchain};
 pub struct PlacedImage<'a> {
     /// The image.
     pub image: &'a Image,
-    /// Place in pixels of the window: left, top, right, bottom. Parts outside are cut off.
+    /// Place in pixels of the window: left, top, right, bottom.
     pub to: [f32; 4],
+    /// The part of the window in which it is seen, to the next whole texel outside.
+    pub within: [f32; 4],
+    /// Left and right, up and down are exchanged.
+    pub flipped: [bool; 2],
+}
+
+/// Pixels of the window and texels of an image along an axis, first and last: of an image from `low` to `high`, of which
+/// as many whole texels are shown as reach into `seen` and none beyond the window.
+fn shown(
+    [low, high]: [f32; 2],
+    seen: [f32; 2],
+    (window, texels): (u32, u32),
+    flipped: bool,
+) -> ([i32; 2], [i32; 2]) {
+    let texel = (high - low) / texels as f32;
+    let pixel = |at: i32| (low + at as f32 * texel).round() as i32;
+    let at = |place: f32| (place.clamp(low, high) - low) / texel;
+    // A texel that is touched by a rounding alone is not seen.
+    let (mut first, mut last) =
+        ((at(seen[0]) + 1e-3).floor() as i32, (at(seen[1]) - 1e-3).ceil() as i32);
+    while first < last && pixel(first) < 0 {
+        first += 1;
+    }
+    while first < last && pixel(last) > window as i32 {
+        last -= 1;
+    }
+    let all = texels as i32;
+    let from = if flipped { [all - first, all - last] } else { [first, last] };
+    ([pixel(first), pixel(last)], from)
 }
 
 /// One interface frame.
@@ -307,16 +336,15 @@ impl Commands<'_> {
     /// Scales an image, linearly, onto the part of its place that lies in the window.
     fn blit(&mut self, placed: &PlacedImage<'_>, window: vk::Image, extent: vk::Extent2D) {
         let [width, height, _] = placed.image.extent();
-        let axis = |low: f32, high: f32, limit: u32, texels: u32| {
-            let clipped = [low, high].map(|x| x.clamp(0.0, limit as f32).round());
-            let from = clipped.map(|x| ((x - low) / (high - low) * texels as f32).round());
-            (clipped.map(|x| x as i32), from.map(|x| x.clamp(0.0, texels as f32) as i32))
+        let axis = |axis: usize, window: u32, texels: u32| {
+            let sides = |r: &[f32; 4]| [r[axis], r[axis + 2]];
+            let flipped = placed.flipped[axis];
+            shown(sides(&placed.to), sides(&placed.within), (window, texels), flipped)
         };
-        let [left, top, right, bottom] = placed.to;
-        let (x, from_x) = axis(left, right, extent.width, width);
-        let (y, from_y) = axis(top, bottom, extent.height, height);
-        let empty = |[a, b]: [i32; 2]| b <= a;
-        if [x, y, from_x, from_y].into_iter().any(empty) {
+        let (x, from_x) = axis(0, extent.width, width);
+        let (y, from_y) = axis(1, extent.height, height);
+        let empty = |to: [i32; 2], from: [i32; 2]| to[1] <= to[0] || from[0] == from[1];
+        if empty(x, from_x) || empty(y, from_y) {
             return;
         }
         let corners = |x: [i32; 2], y: [i32; 2]| {
@@ -369,5 +397,28 @@ impl Commands<'_> {
             raw.cmd_copy_image_to_buffer(self.raw(), image, COPY_FROM.0, to.0.handle, &region);
         }
         self.barrier(Stage::Transfer, Stage::Host);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::shown;
+
+    #[test]
+    fn a_part_of_an_image_is_shown_by_whole_texels() {
+        // All of it; turned over.
+        assert_eq!(shown([10.0, 110.0], [0.0, 200.0], (300, 50), false), ([10, 110], [0, 50]));
+        assert_eq!(shown([10.0, 110.0], [0.0, 200.0], (300, 50), true), ([10, 110], [50, 0]));
+        // Eightfold: from the texel in which the pane begins to the one in which it ends.
+        let (to, from) = shown([-300.0, 500.0], [20.0, 101.0], (300, 100), false);
+        assert_eq!((to, from), ([20, 108], [40, 51]));
+        let (to, from) = shown([-300.0, 500.0], [20.0, 101.0], (300, 100), true);
+        assert_eq!((to, from), ([20, 108], [60, 49]));
+        // No farther than the window.
+        let (to, from) = shown([-301.0, 499.0], [0.0, 300.0], (300, 100), false);
+        assert_eq!((to, from), ([3, 299], [38, 75]));
+        // Beside what is seen there is nothing.
+        let (to, _) = shown([400.0, 500.0], [0.0, 300.0], (300, 100), false);
+        assert!(to[1] <= to[0]);
     }
 }

@@ -1,4 +1,5 @@
-//! Settings of the whole process before a driver is opened.
+//! The process and its system: settings before a driver is opened, and all that only one system has. Other code calls
+//! nothing of one system alone (`tests/directions`).
 
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -47,4 +48,25 @@ fn share_heaps() {
         // SAFETY: a number for the allocator, which takes or refuses it.
         unsafe { libc::mallopt(libc::M_ARENA_MAX, HEAPS) };
     }
+}
+
+/// Largest resident size of this process so far, bytes, where the system tells it.
+pub fn peak_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
+    let kib: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some(kib * 1024)
+}
+
+/// The device of a game pad that this user may not read, where there is one. Only Linux keeps pads from users.
+pub fn unreadable_pad() -> Option<PathBuf> {
+    // Elsewhere there is no such folder.
+    let devices = std::fs::read_dir("/dev/input").ok()?;
+    let joystick = devices.flatten().find(|device| {
+        let name = device.file_name();
+        name.to_string_lossy().starts_with("js")
+    })?;
+    let error = std::fs::File::open(joystick.path()).err()?;
+    let denied = error.kind() == std::io::ErrorKind::PermissionDenied;
+    denied.then(|| joystick.path())
 }

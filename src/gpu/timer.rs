@@ -26,6 +26,13 @@ pub struct FrameTimings {
 }
 
 impl FrameTimings {
+    /// The part of each of `count` images that were made together, if all took as long.
+    #[must_use]
+    pub fn of_each(&self, count: usize) -> Self {
+        let share = |(name, ms): &(String, f64)| (name.clone(), ms / count.max(1) as f64);
+        Self { frame: self.frame, passes: self.passes.iter().map(share).collect() }
+    }
+
     /// Sum of all scopes in milliseconds.
     pub fn total_ms(&self) -> f64 {
         self.passes.iter().map(|(_, ms)| ms).sum()

@@ -17,16 +17,19 @@ const CHUNK_BYTES: u64 = 32 << 20;
 impl Commands<'_> {
     /// Sets every 32-bit word of a buffer.
     pub fn fill(&mut self, buffer: &Buffer, value: u32) {
+        self.fill_first(buffer, buffer.size(), value);
+    }
+
+    /// Sets the 32-bit words of a buffer's first `bytes`.
+    ///
+    /// # Panics
+    /// If there are not as many, none, or they are no multiple of 4.
+    pub fn fill_first(&mut self, buffer: &Buffer, bytes: u64, value: u32) {
+        assert!(bytes > 0 && bytes <= buffer.size() && bytes.is_multiple_of(4), "{bytes} bytes");
         self.uses(&buffer.0, buffer.name(), Stage::Transfer, true, "fill");
-        // SAFETY: the buffer allows it and its size is a multiple of 4.
+        // SAFETY: the buffer allows it, and has this many bytes, a multiple of 4.
         unsafe {
-            self.device().raw.cmd_fill_buffer(
-                self.raw(),
-                buffer.0.handle,
-                0,
-                vk::WHOLE_SIZE,
-                value,
-            );
+            self.device().raw.cmd_fill_buffer(self.raw(), buffer.0.handle, 0, bytes, value);
         }
     }
 

@@ -6,6 +6,7 @@
 use std::time::Duration;
 
 use super::client::{Answer, Client, Subscriptions};
+use super::command::{self, Order};
 use super::message::{Content, ExtendedHeader, Header, Message, TrackedTool};
 use super::picture::Published;
 use super::server::Shared;
@@ -14,9 +15,11 @@ use super::wire::Label;
 use super::{IMAGE_DEVICE, POSE_DEVICE};
 
 /// Types of messages from a client that have an effect.
-const ACCEPTED_TYPES: [&str; 12] = [
+const ACCEPTED_TYPES: [&str; 14] = [
     "TRANSFORM",
     "TDATA",
+    "STRING",
+    "COMMAND",
     "GET_CAPABIL",
     "GET_STATUS",
     "GET_IMAGE",
@@ -47,7 +50,7 @@ pub(super) enum Refused {
 /// Returns whether a message's body is read here; others are skipped, as the protocol demands.
 pub(super) fn is_understood(header: &Header) -> bool {
     let kind = header.kind.text();
-    ["TRANSFORM", "TDATA"].contains(&&*kind) || query(&kind).is_some()
+    ["TRANSFORM", "TDATA", "STRING", "COMMAND"].contains(&&*kind) || query(&kind).is_some()
 }
 
 /// Prefix and type of a query.
@@ -77,8 +80,35 @@ pub(super) fn answer(client: &Client, shared: &Shared, message: &Message) -> Res
             count(shared, taken);
             Ok(())
         }
-        _ => reply(client, shared, message),
+        content => match Order::of_message(content) {
+            Some(order) => take(client, shared, message, order),
+            None => reply(client, shared, message),
+        },
     }
+}
+
+/// Hands an order to the program, or answers one that is none.
+fn take(
+    client: &Client,
+    shared: &Shared,
+    message: &Message,
+    order: Result<Order, String>,
+) -> Result<(), Refused> {
+    let refused = match order {
+        Ok(order) => match shared.request(client, command::stub(message), order) {
+            true => return Ok(()),
+            false => "too many commands wait; wait for the answers".to_owned(),
+        },
+        Err(cause) => cause,
+    };
+    match client.answer(Answer::Message(command::reply(message, Err(refused)))) {
+        true => Ok(()),
+        false => Err(unread()),
+    }
+}
+
+fn unread() -> Refused {
+    Refused::Client("it asks and does not read the answers".to_owned())
 }
 
 fn count(shared: &Shared, taken: bool) {
@@ -130,12 +160,12 @@ fn reply(client: &Client, shared: &Shared, message: &Message) -> Result<(), Refu
     };
     match client.answer(answer) {
         true => Ok(()),
-        false => Err(Refused::Client("it asks and does not read the answers".to_owned())),
+        false => Err(unread()),
     }
 }
 
 /// An answer under the query's name, in its header version and with its number.
-fn respond(query: &Message, content: Content) -> Vec<u8> {
+pub(super) fn respond(query: &Message, content: Content) -> Vec<u8> {
     let extension =
         query.extension.as_ref().map(|e| ExtendedHeader { id: e.id, metadata: Vec::new() });
     Message { device: query.device, extension, ..Message::new("", content) }.encode()

@@ -112,6 +112,26 @@ pub enum Content {
         /// Frame of the wanted poses; empty: the usual one.
         coordinates: Label<32>,
     },
+    /// STRING: a text.
+    String {
+        /// Encoding by its number in the MIB of IANA: 3 is US-ASCII, 106 UTF-8.
+        encoding: u16,
+        /// The text.
+        text: Vec<u8>,
+    },
+    /// COMMAND, or RTS_COMMAND: the reply to one.
+    Command {
+        /// True for RTS_COMMAND.
+        reply: bool,
+        /// The sender's number of it.
+        id: u32,
+        /// Name of the command.
+        name: Label<128>,
+        /// Encoding, as of a STRING.
+        encoding: u16,
+        /// The command, or the reply.
+        text: Vec<u8>,
+    },
     /// Any other type, and queries without content.
     Other {
         /// Its type.
@@ -131,6 +151,9 @@ impl Content {
             Self::Status { .. } => "STATUS",
             Self::Capability(_) => "CAPABILITY",
             Self::StartTracking { .. } => "STT_TDATA",
+            Self::String { .. } => "STRING",
+            Self::Command { reply: false, .. } => "COMMAND",
+            Self::Command { reply: true, .. } => "RTS_COMMAND",
             Self::Other { kind, .. } => return *kind,
         })
     }
@@ -156,6 +179,19 @@ impl Content {
             Self::StartTracking { resolution, coordinates } => {
                 out.extend(resolution.to_be_bytes());
                 out.extend(coordinates.0);
+            }
+            Self::String { encoding, text } => {
+                let text = &text[..text.len().min(u16::MAX.into())];
+                out.extend(encoding.to_be_bytes());
+                out.extend((text.len() as u16).to_be_bytes());
+                out.extend_from_slice(text);
+            }
+            Self::Command { id, name, encoding, text, .. } => {
+                out.extend(id.to_be_bytes());
+                out.extend(name.0);
+                out.extend(encoding.to_be_bytes());
+                out.extend((text.len() as u32).to_be_bytes());
+                out.extend_from_slice(text);
             }
             Self::Other { bytes, .. } => out.extend_from_slice(bytes),
         }
@@ -207,6 +243,25 @@ impl Content {
                 let (resolution, coordinates) = (from.u32()?, Label(from.array()?));
                 from.end()?;
                 Self::StartTracking { resolution, coordinates }
+            }
+            "STRING" => {
+                let mut from = Reader::new(content, "a STRING");
+                let (encoding, length) = (from.u16()?, from.u16()?);
+                let text = from.rest().to_vec();
+                match text.len() == usize::from(length) {
+                    true => Self::String { encoding, text },
+                    false => return Err(odd("a STRING")),
+                }
+            }
+            reply @ ("COMMAND" | "RTS_COMMAND") => {
+                let mut from = Reader::new(content, "a COMMAND");
+                let (id, name) = (from.u32()?, Label(from.array()?));
+                let (encoding, length) = (from.u16()?, from.u32()?);
+                let text = from.rest().to_vec();
+                match text.len() as u64 == u64::from(length) {
+                    true => Self::Command { reply: reply != "COMMAND", id, name, encoding, text },
+                    false => return Err(odd("a COMMAND")),
+                }
             }
             _ => Self::Other { kind, bytes: content.to_vec() },
         })

@@ -12,6 +12,8 @@ use glam::DAffine3;
 use parking_lot::Mutex;
 
 use super::client::{CHECK_INTERVAL, Client};
+use super::command::{Order, Request};
+use super::message::Message;
 use super::picture::{Picture, Published};
 use super::tracking::{TrackerState, Tracking};
 use super::{answer, receive};
@@ -19,6 +21,8 @@ use crate::scene::tracker::Tracker;
 
 /// Time between two looks of the listener for clients.
 const ACCEPT_INTERVAL: Duration = Duration::from_millis(10);
+/// Most orders of clients that may wait for the program.
+const MOST_REQUESTS: usize = 64;
 /// Most refused clients whose last bytes are read before they are dropped, and for how long: a
 /// connection that is closed over unread bytes is reset, and the refusal would never arrive.
 const MOST_LINGERING: usize = 16;
@@ -114,6 +118,7 @@ pub(super) struct Shared {
     pub tracking: Tracking,
     latest: Mutex<Option<Arc<Published>>>,
     clients: Mutex<Vec<Arc<Client>>>,
+    requests: Mutex<VecDeque<Request>>,
     status: Mutex<Status>,
     stopping: AtomicBool,
     /// True where the last published frame no longer shows the present scene.
@@ -133,6 +138,24 @@ impl Shared {
             true => None,
             false => self.latest(),
         }
+    }
+
+    /// Queues a client's order for the program; returns false where too many wait.
+    pub fn request(&self, client: &Client, query: Message, order: Order) -> bool {
+        let clients = self.clients.lock();
+        let Some(client) = clients.iter().find(|own| std::ptr::eq(&***own, client)).cloned() else {
+            // It is being disconnected, and hears no answer.
+            return true;
+        };
+        drop(clients);
+        let mut requests = self.requests.lock();
+        if requests.len() >= MOST_REQUESTS {
+            return false;
+        }
+        requests.push_back(Request { order, client, query });
+        drop(requests);
+        self.tell();
+        true
     }
 
     /// Reports that a pose has arrived, or that clients or errors have changed.
@@ -175,7 +198,7 @@ impl Server {
         Self::bind_and_tell(address, settings, || {})
     }
 
-    /// Like [`Server::bind`]; `told` is called, from threads of the server, whenever a pose has arrived and when
+    /// Like [`Server::bind`]; `told` is called, from threads of the server, whenever a pose or an order has arrived and when
     /// clients or errors have changed. It must not wait.
     ///
     /// # Errors
@@ -195,6 +218,7 @@ impl Server {
             settings,
             latest: Mutex::new(None),
             clients: Mutex::new(Vec::new()),
+            requests: Mutex::default(),
             status: Mutex::new(Status::default()),
             stopping: AtomicBool::new(false),
             outdated: AtomicBool::new(false),
@@ -211,6 +235,11 @@ impl Server {
     /// Address at which it listens.
     pub fn address(&self) -> SocketAddr {
         self.address
+    }
+
+    /// The oldest order of a client that has not been taken; whoever takes it answers it. Does not wait for the network.
+    pub fn request(&self) -> Option<Request> {
+        self.shared.requests.lock().pop_front()
     }
 
     /// State of the tracker. Does not wait for the network.

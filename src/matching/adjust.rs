@@ -13,11 +13,12 @@ const SLIDER_CURVATURE: f64 = 8.0;
 const TISSUE_DIFFERENCE: f64 = 1.0;
 /// Independent patches of speckle that a depth needs on either side.
 const LEAST_PATCHES: f64 = 6.0;
-/// Bounds of the settings. Sliders: those of scanners, and some more. Dynamic range: with less, speckle
-/// alone spans black to white; the largest is that of the scene file. Size: a narrower point-spread
+/// Bounds of the settings, dB but for sizes: what scanners can be set to, and some more. Speckle alone spans
+/// black to white with a dynamic range much below the least. Size: a narrower point-spread
 /// function is lost between samples and scanlines; for a wider one differences are not taken far enough.
 const LARGEST_SLIDER: f64 = 30.0;
-const DYNAMIC_RANGES: (f64, f64) = (20.0, 200.0);
+const DYNAMIC_RANGES: (f64, f64) = (30.0, 120.0);
+const GAINS: (f64, f64) = (-20.0, 60.0);
 const PSF_SCALES: (f64, f64) = (0.25, 4.0);
 
 /// The settings that may change.
@@ -75,7 +76,7 @@ fn gain_at(probe: &Probe, imaging: &Imaging, z: f64) -> f64 {
 }
 
 /// Returns the settings with which the simulated band should look like the acquired one, from its statistics
-/// with `imaging`, and notes on what could not be set or only in part.
+/// with `imaging`, and what of them no scanner would be set to.
 pub(super) fn proposal(
     probe: &Probe,
     imaging: &Imaging,
@@ -84,12 +85,10 @@ pub(super) fn proposal(
     adjusted: Adjusted,
 ) -> (Imaging, Vec<String>) {
     let mut out = imaging.clone();
-    let mut notes = Vec::new();
+    let mut faults = Vec::new();
     let mut bounded = |name: &str, value: f64, (least, most): (f64, f64), why: &str| {
         if !(least..=most).contains(&value) {
-            notes.push(format!(
-                "{name} would be {value:.1} and is kept between {least} and {most}{why}"
-            ));
+            faults.push(format!("{name} would be {value:.1}, not between {least} and {most}{why}"));
         }
         value.clamp(least, most)
     };
@@ -142,7 +141,7 @@ pub(super) fn proposal(
         let sliders = curve.map(|c| c - out.gain);
         out.tgc_sliders = sliders.map(|s| round(s.clamp(-LARGEST_SLIDER, LARGEST_SLIDER), 0.1));
         if sliders.iter().any(|s| s.abs() > LARGEST_SLIDER) {
-            notes.push(format!(
+            faults.push(format!(
                 "brightness changes with depth by more than tgc_sliders of {LARGEST_SLIDER} dB can follow"
             ));
         }
@@ -150,7 +149,11 @@ pub(super) fn proposal(
         let sliders = |z| gain_at(probe, imaging, z) - imaging.gain;
         out.gain = round(mean(&|z, gain| gain - sliders(z)), 0.1);
     }
-    (out, notes)
+    let (least, most) = GAINS;
+    if adjusted.gain && !(least..=most).contains(&out.gain) {
+        faults.push(format!("gain would be {:.1}, not between {least} and {most} dB", out.gain));
+    }
+    (out, faults)
 }
 
 /// Rounds a value so that it is written with few digits, and is used as it is written.

@@ -83,11 +83,19 @@ pub fn draft_of(name: &str) -> Option<&str> {
     (is_number && !file.is_empty()).then_some(file)
 }
 
+/// True for a pipe or a device, which is written to as it is.
+pub fn is_stream(path: &Path) -> bool {
+    path.exists() && !path.is_file() && !path.is_dir()
+}
+
 /// Writes `bytes` as the file `path`, by a [`Draft`].
 ///
 /// # Errors
 /// Errors of the file system; `path` is then unchanged.
 pub fn replace(path: &Path, bytes: &[u8]) -> Result<()> {
+    if is_stream(path) {
+        return std::fs::write(path, bytes);
+    }
     let mut draft = Draft::new(path)?;
     draft.write_all(bytes)?;
     draft.finish()

@@ -1,4 +1,4 @@
-//! Files of UFF (HDF5), the format of the UltraSound ToolBox: beamformed baseband on its scan.
+//! Files of UFF (HDF5), the format of the UltraSound ToolBox: beamformed baseband and radio frequency on their scans.
 //!
 //! As `pyuff_ustb` 3.0 writes them: data [pixel, channel, wave, frame], pixels line by line and by depth along each. Lengths
 //! are in m, angles in rad. Written by `hdf5-pure`, which needs no C library.
@@ -19,68 +19,106 @@ pub enum Axes {
     Sector(f64, Vec<f64>),
 }
 
-/// Beamformed baseband of one frame: the content of a file.
-pub struct Beamformed<'a> {
+/// Beamformed frames: the content of a file. Arrays hold all frames, one after the other.
+pub struct Frames<'a> {
     /// What the file is, in words.
     pub name: &'a str,
     /// The scanlines.
     pub axes: Axes,
-    /// Number of samples along a line, and the distance between them, mm; the first lies on the face.
-    pub samples: usize,
-    /// Distance between samples, mm.
-    pub pitch: f64,
-    /// Lateral place and depth of each sample, mm, line by line.
-    pub places: &'a [[f64; 2]],
-    /// Real and imaginary part of each sample, line by line.
-    pub iq: &'a [f32],
+    /// Number of frames.
+    pub frames: usize,
     /// Frequency that the baseband was shifted by, MHz.
     pub frequency: f64,
     /// Speed by which depth is time, mm/us.
     pub speed: f64,
+    /// Real and imaginary part of the baseband: the object `beamformed_data`.
+    pub iq: Option<Samples<'a>>,
+    /// Radio-frequency lines: the object `beamformed_rf`.
+    pub rf: Option<Samples<'a>>,
 }
 
-/// The file; its one object is `beamformed_data`.
+/// Samples along the scanlines, line by line.
+pub struct Samples<'a> {
+    /// Number of samples along a line; the first lies on the face.
+    pub count: usize,
+    /// Distance between samples, mm.
+    pub pitch: f64,
+    /// Lateral place and depth of each sample of a frame, mm.
+    pub places: &'a [[f64; 2]],
+    /// Their values.
+    pub values: &'a [f32],
+}
+
+/// The file of frames.
 ///
 /// # Panics
-/// When there is not one pair per sample.
-pub fn bytes(of: &Beamformed<'_>) -> Vec<u8> {
-    let lines = match &of.axes {
-        Axes::Linear(axis) | Axes::Sector(_, axis) => axis.len(),
-    };
-    let count = lines * of.samples;
-    assert_eq!([of.places.len(), of.iq.len()], [count, 2 * count], "a place and a pair per sample");
+/// When there is not one pair, or one value of the radio frequency, per sample and frame.
+pub fn bytes(of: &Frames<'_>) -> Vec<u8> {
     let mut file = FileBuilder::new();
-    let mut object = file.create_group("beamformed_data");
-    class(&mut object, "beamformed_data", "uff.beamformed_data");
-    put_text(&mut object, "info", of.name);
-    let scan = scan(&mut object, of);
-    object.add_group(scan.finish());
+    let objects = [
+        ("beamformed_data", &of.iq, &["real", "imag"][..], of.frequency),
+        // What was not shifted.
+        ("beamformed_rf", &of.rf, &["data"][..], 0.0),
+    ];
+    for (name, samples, parts, frequency) in objects {
+        let Some(samples) = samples else { continue };
+        let mut object = file.create_group(name);
+        class(&mut object, name, "uff.beamformed_data");
+        put_text(&mut object, "info", of.name);
+        let scan = scan(&mut object, &of.axes, samples);
+        object.add_group(scan.finish());
+        let lines = samples.places.len() / samples.count;
+        assert_eq!(lines, of.axes.lines(), "a place per sample");
+        put_data(&mut object, samples, parts, of.frames);
+        put(&mut object, "modulation_frequency", &[HERTZ * frequency]);
+        put(&mut object, "sampling_frequency", &[HERTZ * of.speed / (2.0 * samples.pitch)]);
+        file.add_group(object.finish());
+    }
+    file.finish().expect("groups, names and shapes fit the format")
+}
+
+impl Axes {
+    fn lines(&self) -> usize {
+        match self {
+            Self::Linear(axis) | Self::Sector(_, axis) => axis.len(),
+        }
+    }
+}
+
+/// The values, [pixel, channel, wave, frame]: complex ones as a group of their two parts.
+fn put_data(object: &mut GroupBuilder, of: &Samples<'_>, parts: &[&str], frames: usize) {
+    let count = of.places.len();
+    assert_eq!(of.values.len(), frames * count * parts.len(), "a value per sample");
+    let part = |part: usize| -> Vec<f32> {
+        let at = |i, frame| of.values[(frame * count + i) * parts.len() + part];
+        (0..count).flat_map(|i| (0..frames).map(move |frame| at(i, frame))).collect()
+    };
+    let put = |group: &mut GroupBuilder, place: usize| {
+        let dataset = group.create_dataset(parts[place]).with_f32_data(&part(place));
+        dataset.with_shape(&[count as u64, 1, 1, frames as u64]);
+        number(dataset, "data", place == 1);
+    };
+    if parts.len() == 1 {
+        return put(object, 0);
+    }
     let mut data = object.create_group("data");
     for (name, value) in [("class", "single"), ("name", "data")] {
         data.set_attr(name, AttrValue::VarLenString(value.to_owned()));
     }
     data.set_attr("complex", AttrValue::I64Array(vec![1]));
     data.set_attr("imaginary", AttrValue::I64Array(vec![0]));
-    for (name, part) in [("real", 0), ("imag", 1)] {
-        let values: Vec<f32> = of.iq.iter().skip(part).step_by(2).copied().collect();
-        let dataset = data.create_dataset(name).with_f32_data(&values);
-        dataset.with_shape(&[count as u64, 1, 1, 1]);
-        number(dataset, "data", part == 1);
-    }
+    put(&mut data, 0);
+    put(&mut data, 1);
     object.add_group(data.finish());
-    put(&mut object, "modulation_frequency", &[HERTZ * of.frequency]);
-    put(&mut object, "sampling_frequency", &[HERTZ * of.speed / (2.0 * of.pitch)]);
-    file.add_group(object.finish());
-    file.finish().expect("groups, names and shapes fit the format")
 }
 
 /// The scan with its axes, and where each pixel lies.
-fn scan(object: &mut GroupBuilder, of: &Beamformed<'_>) -> GroupBuilder {
+fn scan(object: &mut GroupBuilder, axes: &Axes, of: &Samples<'_>) -> GroupBuilder {
     let mut scan = object.create_group("scan");
     let metres =
         |all: &mut dyn Iterator<Item = f64>| all.map(|mm| METRES * mm).collect::<Vec<f64>>();
-    let depths = (0..of.samples).map(|k| k as f64 * of.pitch);
-    match &of.axes {
+    let depths = (0..of.count).map(|k| k as f64 * of.pitch);
+    match axes {
         Axes::Linear(lateral) => {
             class(&mut scan, "scan", "uff.linear_scan");
             put(&mut scan, "x_axis", &metres(&mut lateral.iter().copied()));

@@ -15,7 +15,7 @@ mod gas;
 mod nodes;
 mod report;
 
-pub use report::{Report, report};
+pub use report::{Report, report, tally};
 
 /// A mesh file should measure between these in its largest direction, mm: from a small cyst to
 /// a tall person. Outside them the unit is wrong far more often than not.

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use super::silent::silent;
 use super::vary::Variant;
 use super::{Origins, Scene, Tissue, Warning};
 
@@ -18,6 +19,7 @@ mod nodes;
 mod paper;
 mod placing;
 mod playing;
+mod poses;
 mod probe;
 mod save;
 mod schema;
@@ -26,6 +28,7 @@ mod settings;
 mod shelf;
 mod study;
 mod table;
+mod tasks;
 mod tissues;
 mod tracker;
 mod trajectory;
@@ -35,14 +38,15 @@ pub use again::SceneFile;
 pub use document::quoted;
 pub(crate) use document::{Document, Source};
 pub use error::SceneError;
-pub use known::{facts, paths, value};
+pub use known::{facts, paths, value, value_of_settings};
 pub use paper::paper;
 pub use placing::SCALES;
+pub use poses::named_pose;
 pub use probe::stated as stated_pose;
-pub use save::{Entry, Note, save, save_with};
+pub use save::{Entry, Note, named_files, save, save_with};
 pub use schema::reference;
 pub(crate) use setting::setting;
-pub use settings::load_settings;
+pub use settings::{load_settings, put_settings};
 pub use study::{Plan, Question, Scenario, Slice};
 pub use table::{Key, changes, differing, entries};
 pub use trajectory::load_trajectory;
@@ -110,7 +114,13 @@ impl Scene {
         let wires = anatomy::wires(&file.wire);
         let settings = settings::settings(&document, &file, None)?;
         let world_from_probe = probe::pose(&document, "probe", &file.probe.stated)?;
+        let poses = poses::build(&document, &file.pose)?;
         presentable(&document, &settings)?;
+        warnings.extend(silent(&settings).into_iter().map(|found| {
+            let at = document.fail(found.path, found.message, found.remedy);
+            let warning = Warning::warning(&at.file, 1, at.message, at.remedy.unwrap_or_default());
+            warning.of(&format!("line {}", at.line))
+        }));
         let volume = match &file.volume {
             Some(table) => Some(fusion::volume(&document, &table.stated, &mut warnings)?),
             None => None,
@@ -134,6 +144,7 @@ impl Scene {
         warnings.extend(tissues.unused());
         let name = file
             .name
+            .clone()
             .unwrap_or_else(|| path.file_stem().unwrap_or_default().to_string_lossy().into_owned());
         let tissues = tissues.used();
         let bases = |tissue: &Tissue| tissues::bases(&file.tissues, &tissue.name);
@@ -148,6 +159,8 @@ impl Scene {
             wires,
             settings,
             world_from_probe,
+            poses,
+            tasks: Vec::new(),
             volume,
             fusion,
             contact,
@@ -158,6 +171,8 @@ impl Scene {
         scene.place_model(placing::placement(&file.model.stated, ""));
         anatomy::countable(&document, &scene.wires)?;
         scene.set_time(0.0);
+        scene.tasks =
+            tasks::build(&document, &file, &scene.poses, &scene.meshes, &scene.instances)?;
         warnings.extend(scene.coincidences(path));
         warnings.extend(scene.lines_in_gas(path));
         let variants = vary::variants(&document, &file.vary.stated, &scene, suggested)?;

@@ -90,7 +90,7 @@ struct State {
 impl Graph {
     /// Writes placement, visibility and shape of every mesh at `seconds` into `instances`, by the
     /// instance's own strategy.
-    fn evaluate(&self, seconds: f64, instances: &mut [Instance]) {
+    pub(crate) fn evaluate(&self, seconds: f64, instances: &mut [Instance]) {
         let mut states: Vec<State> = Vec::with_capacity(self.nodes.len());
         for node in &self.nodes {
             let (mut world, mut shown) = (self.world_from_model, true);

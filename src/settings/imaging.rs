@@ -1,13 +1,17 @@
 //! Settings of image formation and of live quality.
 
-use super::group;
 use super::units::{ATTENUATION, DURATION, LEVEL};
+use super::{Exam, group};
 
 const OFF: f64 = f64::NEG_INFINITY;
 
 group! {
     /// Image formation.
     pub struct Imaging in "imaging" {
+        /// The kind of examination: which measurements the window offers. Chosen in the window, it also sets probe and
+        /// imaging; here it sets nothing else.
+        exam: Exam = Exam::General,
+            Facts::word::<Exam>();
         /// An echo this far below a perfect mirror is white at the face.
         gain: f64 = 16.0,
             Facts::quantity(&LEVEL, -200.0, 200.0).label("Gain").usual(-20.0, 60.0);

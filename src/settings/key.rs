@@ -1,6 +1,7 @@
 //! Rows of settings: the facts about a key, and the functions that get and set the value of its field.
 
 use glam::DVec3;
+use serde_json::{Value as Json, json};
 
 use super::units::{ANGLE, Measure};
 
@@ -297,12 +298,17 @@ impl Facts {
         self.meaning.trim()
     }
 
+    /// The measure of its quantities; none of other keys.
+    pub fn measure(&self) -> Option<&'static Measure> {
+        match self.form {
+            Form::Quantity(measure) | Form::Quantities(measure, _) => Some(measure),
+            _ => None,
+        }
+    }
+
     /// Unit of the value as the program holds it, or what it counts; empty without one.
     pub fn unit(&self) -> &'static str {
-        match self.form {
-            Form::Quantity(measure) | Form::Quantities(measure, _) => measure.unit(),
-            _ => self.counted,
-        }
+        self.measure().map_or(self.counted, Measure::unit)
     }
 
     /// The words that it takes, if it takes words.
@@ -334,6 +340,22 @@ impl Facts {
             (Value::Text(text), _) => format!("{text:?}"),
             (Value::Texts(texts), _) => format!("{texts:?}"),
         })
+    }
+
+    /// A value as JSON, in the unit of [`Self::unit`]; a number that JSON cannot hold (`inf`, `-inf`) is the text of a scene
+    /// file, and [`Value::Absent`] is null.
+    pub fn json(&self, value: &Value) -> Json {
+        match value {
+            Value::Absent => Json::Null,
+            Value::Number(number) if number.is_finite() => json!(number),
+            Value::Number(number) => plain(*number).into(),
+            Value::Whole(count) => json!(count),
+            Value::Switch(on) => json!(on),
+            Value::Word(word) => json!(word),
+            Value::List(all) => json!(all),
+            Value::Text(text) => json!(text),
+            Value::Texts(texts) => json!(texts),
+        }
     }
 
     /// The fault of a value outside the key's range, and its remedy; none for a value in the range. NaN is in no range.

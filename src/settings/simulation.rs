@@ -177,6 +177,10 @@ group! {
         /// are seen, where that is, what the sound has lost, how tissue has moved. `render --labels` writes it.
         labels: bool = false,
             Facts::switch().under("Paths").label("Labels");
+        /// Labels have the expected level of echoes and its share of reverberation, too. Off: these two are left out,
+        /// and what most of the labels' time goes into, tracing the frame a second time.
+        label_levels: bool = true,
+            Facts::switch().under("Paths").label("Their levels");
         /// Seed of every random number.
         seed: u32 = 1,
             Facts::whole(0, u32::MAX).limits("32 bits").under("Paths").label("Seed").usual(0.0, 1000.0);
@@ -201,6 +205,11 @@ impl Simulation {
     /// up to the largest edge that a scene file may give.
     pub fn default_cell(frequency: f64) -> f64 {
         (1.05 / frequency).min(10.0)
+    }
+
+    /// True if frames have labels, and these have levels.
+    pub fn levelled(&self) -> bool {
+        self.labels && self.label_levels
     }
 
     /// Share of its scatterers that a tissue keeps, 0..=1.

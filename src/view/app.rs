@@ -121,6 +121,7 @@ impl App {
         let took = began.elapsed().as_secs_f64() * 1e3;
         self.statistics.add_interface(took);
         if open.is_done() {
+            open.end();
             events.exit();
         }
         match painted {
@@ -168,7 +169,9 @@ impl ApplicationHandler<Wake> for App {
     fn window_event(&mut self, events: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
         match (event, &mut self.open) {
             (WindowEvent::RedrawRequested, _) => self.draw(events),
-            (WindowEvent::CloseRequested, _) => events.exit(),
+            (WindowEvent::CloseRequested, Some(open)) => open.leave(),
+            (WindowEvent::CloseRequested, None) => events.exit(),
+            (WindowEvent::DroppedFile(path), Some(open)) => open.drop_file(&path),
             (event, Some(open)) => open.take(&event),
             (_, None) => {}
         }

@@ -4,6 +4,7 @@ use egui::{Align2, Color32, FontId, Mesh, Pos2, Rect, Shape, Stroke, Ui, pos2, v
 use glam::{DVec2, dvec2};
 
 use super::engine::{Frame, Sector};
+use super::framing::Framing;
 use super::model::Model;
 use super::{real, style};
 use crate::probe::Kind;
@@ -17,8 +18,12 @@ const MARGINS: [f32; 4] = [52.0, 58.0, 64.0, 16.0];
 /// Place of a picture on the screen: whole pixels, since it is copied to whole pixels. Drawing
 /// and clicks then fit the picture.
 pub(super) struct Place {
-    /// The whole image, points.
+    /// The whole image, points; more than is seen where it is enlarged.
     pub(super) rect: Rect,
+    /// The room that it has, points.
+    pub(super) room: Rect,
+    /// Left and right, up and down are exchanged.
+    pub(super) flipped: [bool; 2],
     /// The image and the texts around it, points.
     pub(super) area: Rect,
     /// Points per mm, across and down: equal except for rounding to pixels.
@@ -28,19 +33,24 @@ pub(super) struct Place {
 }
 
 impl Place {
-    /// The largest place that fits into `area`.
-    fn new(area: Rect, frame: &Frame, pixels_per_point: f32) -> Self {
+    /// The place in `area`: the largest one that fits, unless it is framed otherwise.
+    fn new(area: Rect, frame: &Frame, framing: &Framing, pixels_per_point: f32) -> Self {
         let [width, height, _] = frame.image.extent();
-        Self::of(area, [width, height], &frame.sector, pixels_per_point)
+        Self::of(area, [width, height], &frame.sector, framing, pixels_per_point)
     }
 
-    fn of(area: Rect, texels: [u32; 2], sector: &Sector, pixels_per_point: f32) -> Self {
+    fn of(
+        area: Rect,
+        texels: [u32; 2],
+        sector: &Sector,
+        framing: &Framing,
+        pixels_per_point: f32,
+    ) -> Self {
         let [left, top, right, bottom] = MARGINS;
         let room = Rect::from_min_max(area.min + vec2(left, top), area.max - vec2(right, bottom));
         let size = vec2(texels[0] as f32, texels[1] as f32);
         let scale = (room.size() / size).min_elem().max(0.01);
-        let x = room.center().x - size.x * scale / 2.0;
-        let free = Rect::from_min_size(pos2(x, room.top()), size * scale);
+        let free = framing.of(room, size * scale);
         let pixel = |points: f32| (points * pixels_per_point).round() / pixels_per_point;
         let rect = Rect {
             min: pos2(pixel(free.min.x), pixel(free.min.y)),
@@ -51,6 +61,8 @@ impl Place {
         };
         Self {
             rect,
+            room,
+            flipped: framing.flipped,
             area,
             scale: [per_mm(rect.width(), texels[0]), per_mm(rect.height(), texels[1])],
             left: sector.left,
@@ -62,12 +74,25 @@ impl Place {
     pub(super) fn at(&self, lateral: f64, depth: f64) -> Pos2 {
         let x = (lateral - self.left) * self.scale[0];
         let y = (depth - self.top) * self.scale[1];
-        self.rect.min + vec2(x as f32, y as f32)
+        self.turned(self.rect.min + vec2(x as f32, y as f32))
+    }
+
+    /// A point of the screen, and where it lies if the image is not turned over; and back.
+    fn turned(&self, mut at: Pos2) -> Pos2 {
+        for axis in (0..2).filter(|axis| self.flipped[*axis]) {
+            at[axis] = self.rect.min[axis] + self.rect.max[axis] - at[axis];
+        }
+        at
+    }
+
+    /// What is seen of the image, points.
+    pub(super) fn seen(&self) -> Rect {
+        self.rect.intersect(self.room)
     }
 
     /// Point of the image plane at a screen position, mm lateral and mm deep.
     pub(super) fn mm(&self, at: Pos2) -> DVec2 {
-        let from_corner = at - self.rect.min;
+        let from_corner = self.turned(at) - self.rect.min;
         dvec2(
             self.left + f64::from(from_corner.x) / self.scale[0],
             self.top + f64::from(from_corner.y) / self.scale[1],
@@ -87,6 +112,7 @@ pub(super) fn show(
     ui: &mut Ui,
     frame: Option<&Frame>,
     model: &Model,
+    framing: &Framing,
     preparing: &str,
 ) -> Option<Place> {
     let area = ui.max_rect();
@@ -96,8 +122,12 @@ pub(super) fn show(
         painter.text(area.center(), Align2::CENTER_CENTER, preparing, font, style::FAINT);
         return None;
     };
-    let place = Place::new(area, frame, ui.pixels_per_point());
-    texts(&painter, area, frame, model);
+    let place = Place::new(area, frame, framing, ui.pixels_per_point());
+    if !place.seen().is_positive() {
+        // A window too small for any of it.
+        return None;
+    }
+    texts(&painter, area, frame, model, framing);
     ruler(&painter, &place, frame);
     grey_bar(&painter, area, &place, frame);
     orientation(&painter, &place, frame);
@@ -106,17 +136,20 @@ pub(super) fn show(
     Some(place)
 }
 
-fn texts(painter: &egui::Painter, area: Rect, frame: &Frame, model: &Model) {
+fn texts(painter: &egui::Painter, area: Rect, frame: &Frame, model: &Model, framing: &Framing) {
     let (probe, imaging) = (&frame.probe, &frame.settings.imaging);
     let kind = match probe.kind {
         Kind::Convex { .. } => "convex",
         Kind::Linear { .. } => "linear",
         Kind::Phased { .. } => "phased",
     };
-    let settings = format!(
+    let mut settings = format!(
         "{kind}  {:.1} MHz  {:.0} mm  gain {:+.0} dB  range {:.0} dB",
         probe.frequency, probe.depth, imaging.gain, imaging.dynamic_range
     );
+    if framing.zoom() > 1.0 {
+        settings += &format!("  {:.1}x", framing.zoom());
+    }
     let at = area.left_top() + vec2(12.0, 8.0);
     let title = FontId::proportional(15.0);
     painter.text(at, Align2::LEFT_TOP, &model.title, title, style::TEXT);
@@ -178,15 +211,22 @@ fn label_step(points_per_mm: f32) -> f64 {
 }
 
 fn ruler(painter: &egui::Painter, place: &Place, frame: &Frame) {
-    let x = place.rect.right() + 12.0;
+    let seen = place.seen();
+    let x = seen.right() + 12.0;
+    let shown = |mm: f64| (seen.top()..=seen.bottom()).contains(&place.at(0.0, mm).y);
     let (depth, step) = (frame.probe.depth, label_step(place.scale[1] as f32));
     let font = FontId::proportional(11.0);
     let line = Stroke::new(1.0, style::FAINT);
     let at = |mm: f64| pos2(x, place.at(0.0, mm).y);
-    painter.line_segment([at(0.0), at(depth)], line);
+    let within = |at: Pos2| pos2(at.x, at.y.clamp(seen.top(), seen.bottom()));
+    painter.line_segment([within(at(0.0)), within(at(depth))], line);
     let minor = if step > 10.0 { 10.0 } else { 5.0 };
     for i in 0..=(depth / minor) as u32 {
         let mm = f64::from(i) * minor;
+        // The face lies half a pixel below the image's edge.
+        if !shown(mm) && i > 0 {
+            continue;
+        }
         let is_labelled = mm % step == 0.0;
         let length = if is_labelled { 8.0 } else { 4.0 };
         painter.line_segment([at(mm), at(mm) + vec2(length, 0.0)], line);
@@ -196,18 +236,27 @@ fn ruler(painter: &egui::Painter, place: &Place, frame: &Frame) {
             painter.text(to, Align2::LEFT_CENTER, text, font.clone(), style::FAINT);
         }
     }
-    // The transmit focus: a mark on the ruler.
-    let tip = at(frame.probe.focus.min(depth)) - vec2(2.0, 0.0);
-    let corners = vec![tip, tip + vec2(-8.0, -5.0), tip + vec2(-8.0, 5.0)];
-    painter.add(Shape::convex_polygon(corners, style::ACCENT, Stroke::NONE));
+    // The transmit focus: a mark on the ruler; below the image its depth in words.
+    let focus = frame.probe.focus;
+    if focus > depth {
+        let text = format!("focus {focus:.0}");
+        let below = within(at(depth)) + vec2(-2.0, 8.0);
+        painter.text(below, Align2::CENTER_TOP, text, font, style::ACCENT);
+    } else if shown(focus) {
+        let tip = at(focus) - vec2(2.0, 0.0);
+        let corners = vec![tip, tip + vec2(-8.0, -5.0), tip + vec2(-8.0, 5.0)];
+        painter.add(Shape::convex_polygon(corners, style::ACCENT, Stroke::NONE));
+    }
 }
 
 /// Draws the grey bar by the grey map: white on top, the lower end of the dynamic range at the bottom.
 fn grey_bar(painter: &egui::Painter, area: Rect, place: &Place, frame: &Frame) {
     let imaging = &frame.settings.imaging;
-    let height = (place.rect.height() * 0.4).clamp(60.0, 240.0);
-    let bar =
-        Rect::from_min_size(pos2(area.left() + 14.0, place.rect.top() + 16.0), vec2(12.0, height));
+    let height = (place.seen().height() * 0.4).clamp(60.0, 240.0);
+    let bar = Rect::from_min_size(
+        pos2(area.left() + 14.0, place.seen().top() + 16.0),
+        vec2(12.0, height),
+    );
     const STEPS: u32 = 48;
     let mut mesh = Mesh::default();
     for i in 0..=STEPS {
@@ -241,7 +290,10 @@ fn grey_bar(painter: &egui::Painter, area: Rect, place: &Place, frame: &Frame) {
 /// Draws the probe's mark, at the side of its first scanline, which is the image's left.
 fn orientation(painter: &egui::Painter, place: &Place, frame: &Frame) {
     let (start, _) = frame.probe.ray(0, 0);
-    let mark = place.at(start.x, start.z) + vec2(-14.0, -2.0);
+    let outwards = if place.flipped[0] { 14.0 } else { -14.0 };
+    let seen = place.seen().expand2(vec2(14.0, 2.0));
+    // Beside an enlarged image it is at the side where the first scanline lies.
+    let mark = seen.clamp(place.at(start.x, start.z) + vec2(outwards, -2.0));
     painter.circle_filled(mark, 5.0, style::ACCENT);
     painter.circle_stroke(mark, 5.0, Stroke::new(1.0, Color32::BLACK));
 }
@@ -251,7 +303,7 @@ mod tests {
     use egui::{Rect, pos2, vec2};
     use glam::dvec2;
 
-    use super::{Place, Sector, label_step};
+    use super::{Framing, Place, Sector, label_step};
 
     #[test]
     fn labels_never_touch() {
@@ -269,7 +321,7 @@ mod tests {
             [(1.0_f32, [1030.0, 690.0]), (1.25, [811.0, 433.0]), (2.0, [515.0, 633.0])]
         {
             let area = Rect::from_min_size(pos2(3.0, 7.0), vec2(size[0], size[1]));
-            let place = Place::of(area, [410, 700], &sector, ppp);
+            let place = Place::of(area, [410, 700], &sector, &Framing::default(), ppp);
             assert!(area.contains_rect(place.rect), "{ppp}");
             for edge in [place.rect.min.x, place.rect.min.y, place.rect.max.x, place.rect.max.y] {
                 let pixel = edge * ppp;
@@ -281,6 +333,16 @@ mod tests {
                 min.distance(dvec2(-41.0, -3.5)) < 1e-6 && max.distance(dvec2(41.0, 136.5)) < 1e-3
             );
             let there = place.mm(place.at(12.5, 88.0));
+            assert!(there.distance(dvec2(12.5, 88.0)) < 1e-4, "{ppp}: {there}");
+            // Turned over, what was left of the middle is right of it, at the same distance.
+            let mut framing = Framing::default();
+            framing.flip(0);
+            let turned = Place::of(area, [410, 700], &sector, &framing, ppp);
+            assert_eq!(turned.rect, place.rect);
+            let off = |place: &Place| place.at(12.5, 88.0) - place.rect.center();
+            assert!((off(&turned).x + off(&place).x).abs() < 1e-3);
+            assert!((off(&turned).y - off(&place).y).abs() < 1e-3);
+            let there = turned.mm(turned.at(12.5, 88.0));
             assert!(there.distance(dvec2(12.5, 88.0)) < 1e-4, "{ppp}: {there}");
         }
     }

@@ -14,6 +14,8 @@ use super::engine::Frame;
 use super::model::calipers::{Caliper, Kind, Reading};
 use super::model::sheet::{Sheet, Tool, What};
 use super::{keys, notes, style};
+use crate::exam;
+use crate::settings::Exam;
 
 /// Distance within which the pointer takes a point, points.
 const REACH: f32 = 9.0;
@@ -27,9 +29,16 @@ const COLOURS: [Color32; 5] = [
 ];
 
 /// Handles the pointer's events over the picture, and draws all marks.
-pub(super) fn show(ui: &mut Ui, sheet: &mut Sheet, place: &Place, frame: &Frame) {
-    let room = ui.max_rect().intersect(place.rect.expand(12.0));
-    pointer(ui, sheet, place, frame, room);
+/// `listens`: keys may take tools; `bare`: only what belongs to a saved picture is drawn.
+pub(super) fn show(
+    ui: &mut Ui,
+    sheet: &mut Sheet,
+    place: &Place,
+    frame: &Frame,
+    (listens, bare): (bool, bool),
+) {
+    let room = ui.max_rect().intersect(place.seen().expand(12.0));
+    pointer(ui, sheet, place, frame, (room, listens));
     let painter = ui.painter_at(ui.max_rect());
     for (index, mark) in sheet.marks().iter().enumerate() {
         let mut colour = colour(mark.letter);
@@ -48,12 +57,21 @@ pub(super) fn show(ui: &mut Ui, sheet: &mut Sheet, place: &Place, frame: &Frame)
             What::Note(_) => {}
         }
     }
-    if let Some((mark, point)) = sheet.selected() {
+    if let Some((mark, point)) = sheet.selected().filter(|_| !bare) {
         let at = to_screen(place, sheet.marks()[mark].points()[point]);
         painter.circle_stroke(at, REACH, Stroke::new(1.0, style::TEXT));
     }
-    draft(&painter, sheet, place);
+    if !bare {
+        draft(&painter, sheet, place);
+    }
     notes::editor(ui, sheet, place);
+}
+
+/// Where a right click on the image asks what lies there.
+pub(super) fn asked(ui: &Ui, place: &Place) -> Option<Pos2> {
+    let response = ui.ctx().read_response(Id::new("image"))?;
+    let at = response.interact_pointer_pos().filter(|_| response.secondary_clicked());
+    at.filter(|at| place.seen().contains(*at))
 }
 
 /// Colour of a mark by its letter.
@@ -66,15 +84,21 @@ pub(super) fn to_screen(place: &Place, point: DVec2) -> Pos2 {
 }
 
 /// Handles every event by itself: several may have come since the window was last drawn.
-fn pointer(ui: &mut Ui, sheet: &mut Sheet, place: &Place, frame: &Frame, room: Rect) {
+fn pointer(
+    ui: &mut Ui,
+    sheet: &mut Sheet,
+    place: &Place,
+    frame: &Frame,
+    (room, listens): (Rect, bool),
+) {
     let response = ui.interact(room, Id::new("image"), Sense::click_and_drag());
     let reach = f64::from(REACH) * place.mm_per_point();
     let over = response.hovered() || response.is_pointer_button_down_on();
     let events = ui.input(|input| input.events.clone());
-    let types = ui.ctx().egui_wants_keyboard_input();
+    let listens = listens && !ui.ctx().egui_wants_keyboard_input();
     for event in events {
         match event {
-            Event::Key { key, pressed: true, modifiers, .. } if !types => {
+            Event::Key { key, pressed: true, modifiers, .. } if listens => {
                 if let Some(tool) = keys::tool(key, modifiers) {
                     sheet.toggle(tool);
                 }
@@ -137,7 +161,9 @@ fn draft(painter: &Painter, sheet: &Sheet, place: &Place) {
     let end = points[points.len() - 1];
     let colour = style::TEXT;
     match draft.tool {
-        Tool::Measure(kind) if draft.points.len() == kind.points() => {
+        Tool::Measure(kind)
+            if kind.points().map_or(draft.points.len() > 2, |all| draft.points.len() == all) =>
+        {
             let caliper = Caliper::new(kind, draft.points);
             draw(painter, place, &caliper, colour);
             let text = reading(&caliper.reading()).join("  ");
@@ -155,6 +181,15 @@ fn draft(painter: &Painter, sheet: &Sheet, place: &Place) {
 fn draw(painter: &Painter, place: &Place, caliper: &Caliper, colour: Color32) {
     let points: Vec<Pos2> = caliper.points.iter().map(|&p| to_screen(place, p)).collect();
     match caliper.kind {
+        Kind::Trace => {
+            let outline: Vec<Pos2> = points.iter().chain(&points[..1]).copied().collect();
+            dots(painter, &outline, colour);
+            // A cross at each of hundreds of points would hide what is traced.
+            for end in [points[0], points[points.len() - 1]] {
+                cross(painter, end, colour);
+            }
+            return;
+        }
         Kind::Distance | Kind::Angle => dots(painter, &points, colour),
         Kind::Ellipse => {
             dots(painter, &points[..2], colour.gamma_multiply(0.5));
@@ -211,11 +246,14 @@ pub(super) fn reading(reading: &Reading) -> Vec<String> {
             format!("A {:.2} cm²", area / 100.0),
         ],
         Reading::Angle(degrees) => vec![format!("{degrees:.1}°")],
+        Reading::Trace { circumference, area } => {
+            vec![format!("C {circumference:.1} mm"), format!("A {:.2} cm²", area / 100.0)]
+        }
     }
 }
 
-/// Draws the table of measurements beside the grey bar, where a sector leaves room.
-pub(super) fn table(ui: &Ui, sheet: &mut Sheet, frame: &Frame) {
+/// Draws the table of measurements beside the grey bar, where a sector leaves room; `bare`: without its buttons.
+pub(super) fn table(ui: &Ui, sheet: &mut Sheet, exam: Exam, frame: &Frame, bare: bool) {
     let is_measured = |what: &What| matches!(what, What::Caliper(_));
     if !sheet.marks().iter().any(|mark| is_measured(&mark.what)) {
         return;
@@ -237,7 +275,7 @@ pub(super) fn table(ui: &Ui, sheet: &mut Sheet, frame: &Frame) {
                         .spacing([8.0, 3.0])
                         .show(ui, |ui| {
                             for index in 0..sheet.marks().len() {
-                                row(ui, sheet, index, frame, &mut removed);
+                                row(ui, sheet, index, (exam, bare), frame, &mut removed);
                             }
                         });
                 });
@@ -248,7 +286,14 @@ pub(super) fn table(ui: &Ui, sheet: &mut Sheet, frame: &Frame) {
     }
 }
 
-fn row(ui: &mut Ui, sheet: &mut Sheet, index: usize, frame: &Frame, removed: &mut Option<usize>) {
+fn row(
+    ui: &mut Ui,
+    sheet: &mut Sheet,
+    index: usize,
+    (exam, bare): (Exam, bool),
+    frame: &Frame,
+    removed: &mut Option<usize>,
+) {
     let mark = &sheet.marks()[index];
     let What::Caliper(caliper) = &mark.what else {
         return;
@@ -256,6 +301,14 @@ fn row(ui: &mut Ui, sheet: &mut Sheet, index: usize, frame: &Frame, removed: &mu
     let (kind, name, stands) = (caliper.kind, caliper.label.clone(), mark.of == frame.moment());
     let lines = reading(&caliper.reading());
     let letter = RichText::new(mark.letter).strong().color(colour(mark.letter));
+    if bare {
+        let shown = if name.is_empty() { kind.name() } else { &name };
+        ui.label(letter);
+        ui.label(RichText::new(shown).size(12.0).color(style::TEXT));
+        values(ui, lines, stands);
+        ui.end_row();
+        return;
+    }
     let is_selected = sheet.selected().is_some_and(|(mark, _)| mark == index);
     let tip = match stands {
         true => "Select: arrow keys move its last point by a pixel, Del removes it",
@@ -264,21 +317,26 @@ fn row(ui: &mut Ui, sheet: &mut Sheet, index: usize, frame: &Frame, removed: &mu
     if ui.selectable_label(is_selected, letter).on_hover_text(tip).clicked() {
         sheet.select(index);
     }
-    named(ui, sheet, index, kind, name);
-    let colour = if stands { style::TEXT } else { style::FAINT };
-    ui.vertical(|ui| {
-        for line in lines {
-            ui.label(RichText::new(line).color(colour).size(13.0));
-        }
-    });
+    named(ui, sheet, index, (exam, kind), name);
+    values(ui, lines, stands);
     if ui.small_button("x").on_hover_text("Remove (Del)").clicked() {
         *removed = Some(index);
     }
     ui.end_row();
 }
 
+/// Draws the texts of a measurement one below the other.
+fn values(ui: &mut Ui, lines: Vec<String>, stands: bool) {
+    let colour = if stands { style::TEXT } else { style::FAINT };
+    ui.vertical(|ui| {
+        for line in lines {
+            ui.label(RichText::new(line).color(colour).size(13.0));
+        }
+    });
+}
+
 /// Draws the name of a measurement, which is chosen or typed.
-fn named(ui: &mut Ui, sheet: &mut Sheet, index: usize, kind: Kind, name: String) {
+fn named(ui: &mut Ui, sheet: &mut Sheet, index: usize, (exam, kind): (Exam, Kind), name: String) {
     let shown = if name.is_empty() { kind.name() } else { name.as_str() };
     let button = ui.menu_button(RichText::new(shown).size(12.0), |ui| {
         ui.set_max_width(120.0);
@@ -290,9 +348,9 @@ fn named(ui: &mut Ui, sheet: &mut Sheet, index: usize, kind: Kind, name: String)
         if field.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter)) {
             ui.close();
         }
-        for &label in kind.labels() {
-            if ui.button(label).clicked() {
-                sheet.set_text(index, label.to_owned());
+        for item in exam::names(exam, kind) {
+            if ui.button(item.name).on_hover_text(item.meaning).clicked() {
+                sheet.set_text(index, item.name.to_owned());
                 ui.close();
             }
         }

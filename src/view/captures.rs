@@ -10,11 +10,13 @@ use std::thread::JoinHandle;
 
 use serde_json::{Map, Value};
 
-use self::files::{Claim, grey_png, scaled};
+use self::files::{Claim, scaled};
 use super::deaths::CAPTURE;
 use super::engine::Frame;
+use crate::exam::{Picture, Report};
 use crate::gpu::{GpuError, Screenshot};
 use crate::output::movie::{Movie, MovieError};
+use crate::output::picture::grey_png;
 
 /// The settings written beside a picture: see `docs/window.md`.
 pub(super) type Sidecar = Map<String, Value>;
@@ -29,6 +31,14 @@ pub(super) enum CaptureError {
     )]
     File {
         /// The file or folder.
+        path: PathBuf,
+        /// The system's message.
+        cause: String,
+    },
+    /// A picture of a report cannot be read.
+    #[error("{} cannot be read: {cause}. Save the still again, or remove the file", path.display())]
+    Unread {
+        /// The file.
         path: PathBuf,
         /// The system's message.
         cause: String,
@@ -53,6 +63,29 @@ impl From<MovieError> for CaptureError {
     }
 }
 
+/// The M-mode strip as it is saved beside an image or a clip.
+pub(super) struct SavedStrip {
+    /// Width and height.
+    pub(super) size: [u32; 2],
+    /// Grey levels, row by row.
+    pub(super) levels: Vec<u8>,
+    /// Its text in the sidecar.
+    pub(super) facts: Value,
+}
+
+impl SavedStrip {
+    /// Writes it under the number of a capture, and into its sidecar.
+    fn write(self, claim: &mut Claim, sidecar: &mut Sidecar) -> Result<(), CaptureError> {
+        let file = claim.add("-mmode.png");
+        let rgba: Vec<u8> = self.levels.iter().flat_map(|&l| [l, l, l, 255]).collect();
+        files::write_new(&file, &files::colour_png(self.size, &rgba))?;
+        let mut facts = self.facts;
+        facts["file"] = files::name(&file);
+        sidecar.insert("mmode".into(), facts);
+        Ok(())
+    }
+}
+
 /// One image to be saved.
 pub(super) struct Still {
     /// The image.
@@ -61,6 +94,8 @@ pub(super) struct Still {
     pub(super) sidecar: Sidecar,
     /// The image with its marks, as in the window.
     pub(super) marked: Option<Screenshot>,
+    /// The M-mode strip, while it is drawn.
+    pub(super) strip: Option<SavedStrip>,
 }
 
 /// File format of a clip.
@@ -80,6 +115,8 @@ pub(super) struct Clip {
     pub(super) sidecar: Sidecar,
     /// File format.
     pub(super) format: Format,
+    /// The M-mode strip, while it is drawn.
+    pub(super) strip: Option<SavedStrip>,
 }
 
 /// Progress of a capture.
@@ -144,6 +181,9 @@ impl Captures {
                 sidecar.insert("marked_file".into(), files::name(&file));
                 files::write_new(&file, &files::colour_png(shot.size, &shot.rgba))?;
             }
+            if let Some(strip) = still.strip {
+                strip.write(&mut claim, &mut sidecar)?;
+            }
             claim.keep(&sidecar)?;
             Ok(Some(file))
         });
@@ -184,8 +224,33 @@ impl Captures {
             }
             let mut sidecar = clip.sidecar;
             sidecar.insert("file".into(), files::name(&target));
+            if let Some(strip) = clip.strip {
+                strip.write(&mut claim, &mut sidecar)?;
+            }
             claim.keep(&sidecar)?;
             Ok(Some(target))
+        });
+    }
+
+    /// Saves a report with pictures from files as `STEM-NNNN.html` in a folder, which is made where it does not exist.
+    pub(super) fn report(
+        &mut self,
+        (folder, stem): (PathBuf, String),
+        mut report: Report,
+        stills: Vec<PathBuf>,
+    ) {
+        self.begin(1, move |_| {
+            for path in stills {
+                let read = std::fs::read(&path);
+                let unread = |e: std::io::Error| CaptureError::Unread {
+                    path: path.clone(),
+                    cause: e.to_string(),
+                };
+                let png = read.map_err(unread)?;
+                let caption = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+                report.pictures.push(Picture { png, caption });
+            }
+            Ok(Some(files::write_next(&folder, &stem, "html", report.html().as_bytes())?))
         });
     }
 

@@ -13,7 +13,7 @@ use super::tools::Tools;
 /// Height of the bar, points.
 pub(super) const HEIGHT: f32 = 36.0;
 /// Room for speed and marks beside the track, points.
-const WIDE: f32 = 440.0;
+const WIDE: f32 = 366.0;
 /// Speeds at which a loop can be played.
 const SPEEDS: [f64; 4] = [0.25, 0.5, 1.0, 2.0];
 
@@ -59,10 +59,10 @@ fn player(ui: &mut Ui, cine: &mut Cine<Frame>, format: &mut Format, now: Instant
             choose(ui, format);
             speed(ui, cine, now);
             let here = cine.cursor();
-            if button(ui, "End", "The loop that plays and is saved ends with this image") {
+            if button(ui, "]", "The loop that plays and is saved ends with this image") {
                 cine.mark_last(here);
             }
-            if button(ui, "Start", "The loop that plays and is saved begins with this image") {
+            if button(ui, "[", "The loop that plays and is saved begins with this image") {
                 cine.mark_first(here);
             }
         }

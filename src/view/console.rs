@@ -7,18 +7,22 @@ mod controls;
 mod fusion;
 mod image;
 mod input;
+mod poses;
 mod probe;
 mod registration;
 mod simulation;
 
+pub(super) use poses::Naming;
+
 use std::time::Instant;
 
-use egui::{CollapsingHeader, RichText, ScrollArea, Ui};
+use egui::{Align, CollapsingHeader, RichText, ScrollArea, Ui};
 
 use super::files;
 use super::model::{Model, Source};
+use super::naming::Wanted;
 use super::state::State;
-use crate::view::style::button;
+use crate::view::style::{self, button};
 
 /// Width of the console, points.
 pub(super) const WIDTH: f32 = 336.0;
@@ -27,15 +31,22 @@ pub(super) const WIDTH: f32 = 336.0;
 pub(super) fn show(ui: &mut Ui, model: &mut Model, state: &mut State, now: Instant) {
     actions(ui, model, now);
     files::row(ui, model, &mut state.files);
+    if !state.warnings.is_empty() {
+        let text = format!("{} warnings", state.warnings.len());
+        let tip = "What is suspicious about the scene, as `insonify check` says it";
+        let text = RichText::new(text).small().color(style::WARN);
+        ui.toggle_value(&mut state.warned, text).on_hover_text(tip);
+    }
     ui.separator();
     let before = model.settings.clone();
     ScrollArea::vertical().auto_shrink([false; 2]).show(ui, |ui| {
-        section(ui, "Probe", true, |ui| probe::show(ui, &mut model.settings));
+        section(ui, "Probe", true, |ui| probe::show(ui, &mut model.settings, &mut state.exam.open));
         section(ui, "Image", true, |ui| image::show(ui, &mut model.settings));
+        section(ui, "Poses", false, |ui| poses::show(ui, model, &mut state.poses, now));
         let mut animate = |ui: &mut Ui| animation::show(ui, model, now);
         section(ui, "Animation", false, &mut animate);
         section(ui, "Probe input", false, |ui| {
-            input::show(ui, model, &mut state.inputs, now);
+            input::show(ui, model, state, now);
         });
         let (settings, lattice) = (&mut model.settings, model.file.lattice);
         section(ui, "Simulation", false, |ui| simulation::show(ui, settings, state, lattice));
@@ -48,12 +59,14 @@ pub(super) fn show(ui: &mut Ui, model: &mut Model, state: &mut State, now: Insta
         }
         let (settings, loaded) = (&mut model.settings, &model.loaded);
         let mut layer = model.layer;
-        section(ui, "Tissues", false, |ui| {
+        let wanted = state.wanted.take();
+        let opens = |is: Wanted| (wanted == Some(is)).then_some(true);
+        opened(ui, "Tissues", opens(Wanted::Tissue), |ui| {
             anatomy::layer(ui, &mut layer);
             anatomy::tissues(ui, settings, loaded, &mut state.tissue);
         });
         let meshes = &model.meshes;
-        section(ui, "Surfaces", false, |ui| {
+        opened(ui, "Surfaces", opens(Wanted::Surface), |ui| {
             anatomy::surfaces(ui, settings, loaded, meshes, &mut state.mesh);
         });
         if layer != model.layer {
@@ -68,6 +81,14 @@ fn section(ui: &mut Ui, name: &str, open: bool, add: impl FnOnce(&mut Ui)) {
     CollapsingHeader::new(RichText::new(name).strong()).default_open(open).show(ui, add);
 }
 
+/// A section that `open` opens or closes for the user.
+fn opened(ui: &mut Ui, name: &str, open: Option<bool>, add: impl FnOnce(&mut Ui)) {
+    let header = CollapsingHeader::new(RichText::new(name).strong()).open(open).show(ui, add);
+    if open.is_some() {
+        header.header_response.scroll_to_me(Some(Align::TOP));
+    }
+}
+
 fn actions(ui: &mut Ui, model: &mut Model, now: Instant) {
     ui.horizontal(|ui| {
         let word = if model.frozen { "Live" } else { "Freeze" };
@@ -76,7 +97,12 @@ fn actions(ui: &mut Ui, model: &mut Model, now: Instant) {
         }
         let [back, forward] = model.undoable();
         let undo = ui.add_enabled(back, egui::Button::new("Undo"));
-        if undo.on_hover_text("Take back the last change of a setting (Ctrl+Z)").clicked() {
+        if undo
+            .on_hover_text(
+                "Take back the last change of settings, probe, marks or recording (Ctrl+Z)",
+            )
+            .clicked()
+        {
             model.undo(now);
         }
         let redo = ui.add_enabled(forward, egui::Button::new("Redo"));

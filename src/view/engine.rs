@@ -12,6 +12,7 @@ use parking_lot::{Condvar, Mutex, MutexGuard};
 use super::deaths::SIMULATION;
 use super::link::Link;
 use super::look::{Look, Pictured};
+use super::model::mmode::{Aim, Column};
 use super::model::{Order, Settings};
 use crate::gpu::{Device, FrameTimings, Image, MemoryUse};
 use crate::live::Grade;
@@ -114,11 +115,20 @@ const VIEW3D_PUT_OFF: u32 = 6;
 /// draws again.
 const WINDOW_PATIENCE: Duration = Duration::from_millis(40);
 
+/// What the M-mode strip takes with a picture. It is kept out of the frame, of which the loop holds hundreds.
+pub enum Film {
+    /// Nothing.
+    None,
+    /// The picture's pixels.
+    Picture(Pixels),
+    /// Columns along a line of the time since the picture before, the last one at its moment.
+    Columns(Aim, Vec<Column>),
+}
+
 /// News from the simulation for the window.
 pub enum News {
-    /// A picture, and its pixels where [`Order::reads_back`]. The pixels are kept out of the frame, of
-    /// which the loop holds hundreds.
-    Frame(Box<Frame>, Option<Pixels>),
+    /// A picture, and what the M-mode strip takes with it.
+    Frame(Box<Frame>, Film),
     /// A picture of the anatomy.
     View3d(Box<Pictured>),
     /// The work under way before the first picture.

@@ -1,7 +1,7 @@
 //! The devices beside keyboard and mouse that move the probe.
 
 use std::net::{IpAddr, SocketAddr};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use super::files::said;
@@ -9,7 +9,8 @@ use super::link::{Bell, Link, Report};
 use super::model::{Model, StoredTrajectory, TrajectoryState, age};
 use super::pads::{Pads, Word};
 use super::{Listen, ViewError};
-use crate::igtl::{PORT, TrackerState};
+use crate::igtl::{PORT, Request, TrackerState};
+use crate::output::files;
 use crate::scene::Tracker;
 use crate::scene::file::load_trajectory;
 
@@ -30,6 +31,8 @@ pub(super) struct Inputs {
     pub(super) word: Word,
     /// The trajectory file that is written and read.
     pub(super) path: String,
+    /// An existing trajectory file that the user wants replaced.
+    given_up: Option<String>,
     /// The last error of that file.
     pub(super) problem: Option<String>,
     /// Time of the next look even if nothing arrives.
@@ -62,6 +65,7 @@ impl Inputs {
             pads,
             word: Word::default(),
             path: "trajectory.csv".to_owned(),
+            given_up: None,
             problem: None,
             due: None,
             greeted: 0,
@@ -76,6 +80,11 @@ impl Inputs {
     /// Address at which clients are awaited.
     pub(super) fn address(&self) -> Option<SocketAddr> {
         self.report.as_ref().map(|report| report.address)
+    }
+
+    /// The oldest order of an OpenIGTLink client that nobody has taken.
+    pub(super) fn request(&self) -> Option<Request> {
+        self.link.request()
     }
 
     /// Goes on with another scene's tracker.
@@ -105,17 +114,42 @@ impl Inputs {
         }
     }
 
+    /// The trajectory file, or where it exists the first of its name with a number that does not.
+    pub(super) fn free(&self) -> PathBuf {
+        let path = PathBuf::from(&self.path);
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let numbered = (2..).map(|number| path.with_file_name(format!("{stem}-{number}.csv")));
+        let mut all = std::iter::once(path.clone()).chain(numbered);
+        all.find(|path| !path.exists()).expect("there is no last number")
+    }
+
+    /// Returns whether saving would replace a file that the user has not yet given up.
+    pub(super) fn would_replace(&self) -> bool {
+        Path::new(&self.path).exists() && self.given_up.as_ref() != Some(&self.path)
+    }
+
+    /// Writes the recorded trajectory into its file; asks first where that exists.
+    pub(super) fn save_or_ask(&mut self, trajectory: &mut TrajectoryState) {
+        match self.would_replace() {
+            true => {
+                let text = format!("{} exists and would be lost: replace it?", self.path);
+                (self.problem, self.given_up) = (Some(text), Some(self.path.clone()));
+            }
+            false => self.save(trajectory),
+        }
+    }
+
     /// Writes the recorded trajectory into its file.
     pub(super) fn save(&mut self, trajectory: &mut TrajectoryState) {
         let Some(stored) = &mut trajectory.stored else { return };
         let Some(recording) = &stored.unsaved else {
             return;
         };
-        let written = std::fs::write(&self.path, recording.text());
-        self.problem = match written {
+        let path = Path::new(&self.path);
+        self.problem = match files::replace(path, recording.text().as_bytes()) {
             Ok(()) => {
                 stored.unsaved = None;
-                stored.name = name(Path::new(&self.path));
+                stored.name = name(path);
                 None
             }
             Err(error) => Some(format!(
@@ -123,14 +157,15 @@ impl Inputs {
                 self.path
             )),
         };
+        self.given_up = None;
     }
 
     /// Reads a trajectory from its file.
-    pub(super) fn load(&mut self, trajectory: &mut TrajectoryState) {
+    pub(super) fn load(&mut self, model: &mut Model, now: Instant) {
         let path = Path::new(&self.path);
         self.problem = match load_trajectory(path) {
             Ok(track) => {
-                trajectory.stored = Some(StoredTrajectory::loaded(track, name(path)));
+                model.keep_trajectory(StoredTrajectory::loaded(track, name(path)), now);
                 None
             }
             Err(error) => Some(said(&error)),

@@ -5,6 +5,7 @@ use std::time::Instant;
 use egui::{Event, Key, Modifiers};
 
 use super::files::Purpose;
+use super::leaving::{self, Way};
 use super::mmode;
 use super::model::calipers::Kind;
 use super::model::sheet::Tool;
@@ -37,8 +38,11 @@ enum Action {
     Console,
     View3d,
     Planes,
+    Worksheet,
     Hold,
     Timing,
+    Flip(usize),
+    Whole,
     Mmode,
     Real,
     Layer,
@@ -86,14 +90,15 @@ const BINDINGS: &[(&str, &[Binding], &str)] = &[
     ),
     ("Enter", &[(Key::Enter, false, Action::Loop)], "frozen: play and stop the loop"),
     (
-        "L O K N",
+        "L O K J N",
         &[
             (Key::L, false, Action::Take(Tool::Measure(Kind::Distance))),
             (Key::O, false, Action::Take(Tool::Measure(Kind::Ellipse))),
             (Key::K, false, Action::Take(Tool::Measure(Kind::Angle))),
+            (Key::J, false, Action::Take(Tool::Measure(Kind::Trace))),
             (Key::N, false, Action::Take(Tool::Note)),
         ],
-        "measure a distance, an ellipse, an angle; place a text",
+        "measure a distance, an ellipse, an angle, an outline; place a text",
     ),
     (
         "Del",
@@ -124,27 +129,37 @@ const BINDINGS: &[(&str, &[Binding], &str)] = &[
         "depth (10 mm)",
     ),
     (
+        "F U Z",
+        &[
+            (Key::F, false, Action::Flip(0)),
+            (Key::U, false, Action::Flip(1)),
+            (Key::Z, false, Action::Whole),
+        ],
+        "image: left and right, up and down exchanged; the whole of it (the wheel enlarges)",
+    ),
+    (
         "Ctrl+Z Ctrl+Y",
         &[(Key::Z, true, Action::Undo), (Key::Y, true, Action::Redo)],
-        "undo and redo settings",
+        "undo and redo settings, ways of the probe, marks, recordings",
     ),
     (
         "Ctrl+S Ctrl+O",
         &[(Key::S, true, Action::Save), (Key::O, true, Action::Load)],
-        "save settings (with Shift: as), load settings or a scene",
+        "save settings (with Shift: as), open a scene or take its settings",
     ),
     (
-        "C V G T M B I",
+        "C V X G T M B I",
         &[
             (Key::C, false, Action::Console),
             (Key::V, false, Action::View3d),
+            (Key::X, false, Action::Worksheet),
             (Key::G, false, Action::Planes),
             (Key::T, false, Action::Timing),
             (Key::M, false, Action::Mmode),
             (Key::B, false, Action::Real),
             (Key::I, false, Action::Layer),
         ],
-        "console, 3D view, planes of the volume, timings, M-mode, which pixels are real, tissues in colours",
+        "console, 3D view, worksheet, planes of the volume, timings, M-mode, which pixels are real, tissues in colours",
     ),
     (
         "? Esc",
@@ -165,9 +180,9 @@ pub(super) fn list() -> impl Iterator<Item = (&'static str, &'static str)> {
     BINDINGS.iter().map(|(keys, _, text)| (*keys, *text))
 }
 
-/// Carries out the pressed keys, unless a field is being typed into.
+/// Carries out the pressed keys, unless a field is being typed into or a dialog is open.
 pub(super) fn apply(ctx: &egui::Context, model: &mut Model, state: &mut State, now: Instant) {
-    if ctx.egui_wants_keyboard_input() {
+    if ctx.egui_wants_keyboard_input() || state.has_dialog() {
         return;
     }
     let pressed = ctx.input(|input| {
@@ -229,7 +244,18 @@ fn carry_out(
 ) {
     let before = model.settings.clone();
     match action {
-        Action::Move(axis, steps) if state.tools.nudge(axis, steps, modifiers.shift) => {}
+        Action::Move(axis, steps)
+            if state.tools.nudge(
+                &mut model.sheet,
+                axis,
+                // On the screen: turned over, the image's axes point the other way.
+                if state.framing.flipped[usize::from(axis != Axis::Lateral)] {
+                    -steps
+                } else {
+                    steps
+                },
+                modifiers.shift,
+            ) => {}
         Action::Move(axis, steps) => {
             let step = if axis.shifts() { STEP[0] } else { STEP[1] };
             let fine = if modifiers.shift { 0.25 } else { 1.0 };
@@ -253,7 +279,7 @@ fn carry_out(
         Action::Frame(_) | Action::Loop => {}
         // Taken in order with the pointer's events: see `tool`.
         Action::Take(_) => {}
-        Action::Delete => drop(state.tools.sheet.delete()),
+        Action::Delete => drop(model.sheet.delete()),
         Action::Still => state.tools.want_still(),
         Action::Clip => state.tools.want_clip(),
         Action::Play if model.animated => {
@@ -262,7 +288,7 @@ fn carry_out(
         }
         Action::Play => {}
         Action::Home => model.place_probe(Source::Keyboard, model.home, now),
-        Action::Record => model.record(now),
+        Action::Record => leaving::record(model, state, now),
         Action::Replay => model.replay(now),
         Action::Undo => return model.undo(now),
         Action::Redo => return model.redo(now),
@@ -272,11 +298,14 @@ fn carry_out(
         Action::Console => state.console = !state.console,
         Action::View3d => state.view3d.open = !state.view3d.open,
         Action::Planes => state.planes.open = !state.planes.open,
+        Action::Worksheet => state.exam.open = !state.exam.open,
         Action::Hold => {
             let stays = model.hold.as_ref().is_some_and(|hold| hold.stays);
             model.stay_on_skin(!stays, now);
         }
         Action::Timing => state.timing = !state.timing,
+        Action::Flip(axis) => state.framing.flip(axis),
+        Action::Whole => state.framing.whole(),
         Action::Mmode => mmode::toggle(model, now),
         Action::Real => {
             model.real.shown = !model.real.shown;
@@ -288,8 +317,8 @@ fn carry_out(
         }
         Action::Help => state.help = !state.help,
         Action::Close if state.help => state.help = false,
-        Action::Close => drop(state.tools.sheet.cancel()),
-        Action::Quit => state.quit = true,
+        Action::Close => drop(model.sheet.cancel()),
+        Action::Quit => leaving::leave(Way::Quit, model, state, now),
     }
     model.note(&before, now);
 }
@@ -325,6 +354,6 @@ mod tests {
         let rotate = Some(Action::Move(Axis::Rotate, -1.0));
         assert_eq!(action(Key::Q, Modifiers::NONE), rotate);
         assert_eq!(action(Key::Q, Modifiers::SHIFT), rotate, "a finer step");
-        assert_eq!(action(Key::Z, Modifiers::NONE), None);
+        assert_eq!(action(Key::Y, Modifiers::NONE), None);
     }
 }

@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use egui::{Align2, CentralPanel, Frame as Space, Panel, RichText, Ui};
+use glam::DVec3;
 
 use super::bmode::{self, Place};
 use super::console;
@@ -13,15 +14,16 @@ use super::model::mmode::Strip;
 use super::state::State;
 use super::statistics::Times;
 use super::{
-    calipers, cine, deaths, files, keys, mmode, notice, planes, saved, strip, style, timing, view3d,
+    calipers, cine, deaths, exam, files, gallery, keys, leaving, lesson, mmode, naming, notice,
+    offer, planes, saved, strip, style, timing, view3d,
 };
 
 /// Width of the toggles and the loop beside each other, points.
-const BAR: f32 = 760.0;
+const BAR: f32 = 940.0;
 /// Width of one toggle more, where there is a volume.
 const PLANES: f32 = 62.0;
 
-/// Least height that is left to the image beside a panel of timings, points.
+/// Least height that is left to the image beside a panel of timings, and least width beside the worksheet, points.
 const LEAST_IMAGE: f32 = 200.0;
 
 /// Places of the pictures.
@@ -84,9 +86,16 @@ pub(super) fn show(
     } else {
         state.mmode.close();
     }
+    // The worksheet takes the place of the 3D view where there is no room for both.
+    let sheet = state.exam.open.then_some(exam::WIDTH).filter(|sheet| {
+        let room = ui.available_width();
+        let beside = state.view3d.open || state.planes.open;
+        let narrow = view3d::width(room).filter(|_| beside).map(|view3d| room - view3d);
+        narrow.is_some_and(|left| left < sheet + LEAST_IMAGE)
+    });
     // Transparent: the pictures are below the interface.
     let planes = state.planes.open && model.registration.is_some();
-    let beside = state.view3d.open || planes;
+    let beside = (state.view3d.open || planes) && sheet.is_none();
     let room = view3d::width(ui.available_width()).filter(|_| beside && !alone);
     if let Some(width) = room.filter(|_| planes) {
         let panel = Panel::right("planes").resizable(false).exact_size(width);
@@ -96,26 +105,55 @@ pub(super) fn show(
     let view3d = room.filter(|_| !planes).map(|width| {
         let panel = Panel::right("view3d").resizable(false).exact_size(width);
         let panel = panel.frame(Space::NONE).show_separator_line(false);
-        let shown = panel.show(ui, |ui| view3d::show(ui, model, &mut state.view3d, pictured));
+        let shown = panel.show(ui, |ui| {
+            let place = view3d::show(ui, model, &mut state.view3d, pictured);
+            lesson::in_3d(ui, &place, model, &state.lesson, pictured);
+            place
+        });
+        if let Some((at, ray)) = state.view3d.asked.take() {
+            state.asked = Some((at, naming::Question::Sight(ray)));
+        }
         shown.inner
     });
+    if state.exam.open {
+        Panel::left("worksheet")
+            .resizable(false)
+            .exact_size(exam::WIDTH)
+            .show(ui, |ui| exam::show(ui, model, state));
+    }
     let centre = CentralPanel::default().frame(Space::NONE);
     let place = centre.show(ui, |ui| {
         if alone {
             return None;
         }
-        let place = bmode::show(ui, frame, model, state.preparing);
-        let sheet = &mut state.tools.sheet;
+        let place = bmode::show(ui, frame, model, &state.framing, state.preparing);
+        // A picture to be saved has its marks and nothing that is pressed.
+        let bare = state.tools.wants_shot(model);
+        state.tools.cleared = bare;
+        let (sheet, listens) = (&mut model.sheet, !state.has_dialog());
+        let kind = model.settings.imaging.exam;
         if let (Some(place), Some(frame)) = (&place, frame) {
-            calipers::show(ui, sheet, place, frame);
-            calipers::table(ui, sheet, frame);
-            strip::show(ui, &mut state.tools);
+            calipers::show(ui, sheet, place, frame, (listens, bare));
+            state.framing.follow(ui, place);
+            if let Some(at) = calipers::asked(ui, place) {
+                let mm = place.mm(at);
+                let point = frame.pose.transform_point3(DVec3::new(mm.x, 0.0, mm.y));
+                state.asked = Some((at, naming::Question::Place(point)));
+            }
+            calipers::table(ui, sheet, kind, frame, bare);
+            if !bare {
+                strip::show(ui, &mut state.tools, sheet);
+            }
         }
         if let (Some(place), Some(frame), Some(strip)) = (&place, frame, &mut model.mmode) {
             mmode::aim(ui, place, frame, strip, model.frozen);
         }
-        notice::show(ui, &state.inputs);
-        saved::show(ui, &mut state.tools);
+        if !bare {
+            notice::show(ui, &state.inputs);
+            notice::recording(ui, model, now);
+            saved::show(ui, &mut state.tools);
+            notice::stale(ui, state.stale.as_deref());
+        }
         place
     });
     if model.mmode.as_ref().map(Strip::line) != line {
@@ -131,8 +169,16 @@ pub(super) fn show(
             state.problem = None;
         }
     }
+    notice::warnings(ui.ctx(), state);
+    naming::show(ui, model, state);
     deaths::show(ui.ctx(), model, state);
-    files::dialog(ui.ctx(), model, &mut state.files, now);
+    match state.leaving.is_some() {
+        _ if state.offer.is_some() => offer::show(ui.ctx(), state),
+        true => leaving::show(ui.ctx(), model, state, now),
+        false => files::dialog(ui.ctx(), model, state, now),
+    }
+    lesson::show(ui.ctx(), model, &mut state.lesson, now);
+    gallery::show(ui.ctx(), model, state, now);
     if state.help {
         help(ui.ctx(), &mut state.help);
     }
@@ -146,6 +192,8 @@ fn toggles(ui: &mut Ui, model: &mut Model, state: &mut State, now: Instant) {
         (&mut state.view3d.open, "3D", "Anatomy, probe and fan from outside (V)"),
         (&mut state.timing, "Timings", "Where the time goes (T)"),
         (&mut state.help, "Keys", "What the keyboard does (?)"),
+        (&mut state.gallery.open, "Scenes", "Pictures of the scenes that ship, to open one"),
+        (&mut state.lesson.open, "Lesson", "Tasks of this scene, with a guide and a score"),
     ] {
         ui.toggle_value(open, name).on_hover_text(tip);
     }

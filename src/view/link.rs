@@ -11,7 +11,7 @@ use winit::event_loop::EventLoopProxy;
 
 use super::session::Wake;
 use crate::gpu::{GpuError, Image};
-use crate::igtl::{IgtlError, Picture, Server, ServerSettings, Status, TrackerState};
+use crate::igtl::{IgtlError, Picture, Request, Server, ServerSettings, Status, TrackerState};
 use crate::scene::Tracker;
 use crate::sim::layout;
 
@@ -84,6 +84,11 @@ impl Link {
     /// Ends all connections.
     pub(super) fn close(&self) {
         *self.0.lock() = None;
+    }
+
+    /// The oldest order of a client that nobody has taken.
+    pub(super) fn request(&self) -> Option<Request> {
+        self.0.lock().as_ref().and_then(Server::request)
     }
 
     /// State of the server; none without one.

@@ -1,15 +1,20 @@
-//! The M-mode strip below the image, and its scanline in the image.
+//! The M-mode strip below the image, and its line in the image.
 
 use egui::{
     Align2, Color32, ColorImage, DragValue, FontId, PointerButton, Rect, Sense, Stroke,
     TextureHandle, TextureOptions, Ui, pos2, vec2,
 };
 
+use glam::DVec2;
+use serde_json::json;
+
 use super::bmode::Place;
+use super::captures::SavedStrip;
 use super::engine::Frame;
 use super::model::Model;
-use super::model::mmode::{ROWS, Span, Strip, nearest_line};
+use super::model::mmode::{Aim, ROWS, Span, Strip, nearest_line};
 use super::style;
+use crate::probe::Probe;
 
 /// Height of the panel, points.
 pub(super) const HEIGHT: f32 = 208.0;
@@ -20,22 +25,27 @@ const WIDEST: usize = 1024;
 /// Choices for the width of the strip, s.
 const WINDOWS: [f64; 5] = [1.0, 2.0, 4.0, 8.0, 16.0];
 
-/// Number of columns below which a strip is too coarse to be read.
-const FEW: usize = 40;
+/// Columns per second of the scene below which a heart's valves look like stairs: those of a slow scanner.
+const FEW: f64 = 200.0;
+
+/// Most measurements at a time: one for each letter.
+const MOST: usize = 26;
 
 /// The state of the panel.
 pub(super) struct Panel {
     /// Seconds across the strip.
-    window: f64,
-    /// The measurement, if any.
-    span: Option<Span>,
+    pub(super) window: f64,
+    /// The measurements, oldest first.
+    pub(super) spans: Vec<Span>,
+    /// The last of them is being drawn.
+    drawing: bool,
     /// The strip on the device, and its content: revision, seconds across, pixels across.
     texture: Option<(TextureHandle, (u64, f64, usize))>,
 }
 
 impl Default for Panel {
     fn default() -> Self {
-        Self { window: 2.0, span: None, texture: None }
+        Self { window: 2.0, spans: Vec::new(), drawing: false, texture: None }
     }
 }
 
@@ -46,18 +56,50 @@ impl Panel {
     }
 }
 
+/// The strip on the screen with its measurements, to be saved.
+pub(super) fn saved(model: &Model, panel: &Panel) -> Option<SavedStrip> {
+    let strip = model.mmode.as_ref()?;
+    let (end, mm) = (strip.newest()?, strip.length()?);
+    let line = match strip.line() {
+        Aim::Scanline(line) => json!({ "scanline": line }),
+        Aim::Free(ends) => json!({ "free_mm": ends.map(|end| end.to_array()) }),
+    };
+    let measurements = ('A'..='Z').zip(&panel.spans).map(|(letter, span)| {
+        json!({
+            "letter": letter,
+            "from_s_mm": span.from,
+            "to_s_mm": span.to,
+            "seconds": span.seconds(),
+            "mm": span.millimetres(),
+            "per_minute": span.per_minute(),
+            "mm_per_s": span.speed(),
+        })
+    });
+    let facts = json!({
+        "line": line,
+        "begin_s": end - panel.window,
+        "end_s": end,
+        "length_mm": mm,
+        "columns": strip.columns_in(end, panel.window),
+        "measurements": measurements.collect::<Vec<_>>(),
+    });
+    let levels = strip.raster(end, panel.window, WIDEST);
+    Some(SavedStrip { size: [WIDEST as u32, ROWS as u32], levels, facts })
+}
+
 /// Opens the strip on the image's middle scanline, or closes it.
 pub(super) fn toggle(model: &mut Model, now: std::time::Instant) {
     model.mmode = match model.mmode {
         Some(_) => None,
-        None => Some(Strip::new(model.settings.probe.scanlines / 2)),
+        None => Some(Strip::new(Aim::Scanline(model.settings.probe.scanlines / 2))),
     };
     model.touch(now);
 }
 
 /// Draws the strip and its controls into the panel below the image.
 pub(super) fn show(ui: &mut Ui, model: &mut Model, panel: &mut Panel) {
-    let (scanlines, frozen) = (model.settings.probe.scanlines, model.frozen);
+    let (probe, frozen) = (model.settings.probe.clone(), model.frozen);
+    let speed = model.clock.speed();
     let animated = model.animated;
     let Some(strip) = &mut model.mmode else {
         return;
@@ -66,17 +108,19 @@ pub(super) fn show(ui: &mut Ui, model: &mut Model, panel: &mut Panel) {
         ui.vertical(|ui| {
             ui.set_width(168.0);
             ui.strong("M-mode");
-            ui.add_enabled_ui(!frozen, |ui| line(ui, strip, scanlines));
+            ui.add_enabled_ui(!frozen, |ui| line(ui, strip, &probe));
             width(ui, panel);
-            measured(ui, panel.span);
-            remarks(ui, strip, animated, panel);
+            egui::ScrollArea::vertical().show(ui, |ui| {
+                measured(ui, panel);
+                remarks(ui, strip, animated, speed, panel);
+            });
         });
         ui.separator();
         let (area, response) = ui.allocate_exact_size(ui.available_size(), Sense::drag());
         let inner = Rect::from_min_max(area.min, area.max - vec2(44.0, 18.0));
         let end = strip.newest().unwrap_or(panel.window).max(panel.window);
         draw(ui, strip, panel, inner, end);
-        let Some(depth) = strip.depth() else { return };
+        let Some(depth) = strip.length() else { return };
         rulers(ui, inner, depth, panel.window, end);
         let at = |[seconds, mm]: [f64; 2]| {
             let x = 1.0 - ((end - seconds) / panel.window) as f32;
@@ -89,31 +133,52 @@ pub(super) fn show(ui: &mut Ui, model: &mut Model, panel: &mut Panel) {
         };
         if response.drag_started_by(PointerButton::Primary) {
             let origin = ui.input(|i| i.pointer.press_origin());
-            panel.span = origin.map(under).map(|from| Span { from, to: from });
+            if let Some(from) = origin.map(under).filter(|_| panel.spans.len() < MOST) {
+                panel.spans.push(Span { from, to: from });
+                panel.drawing = true;
+            }
         }
-        if let (Some(span), Some(point)) = (&mut panel.span, response.interact_pointer_pos()) {
+        if let (true, Some(span), Some(point)) =
+            (panel.drawing, panel.spans.last_mut(), response.interact_pointer_pos())
+        {
             span.to = under(point);
         }
+        panel.drawing &= !response.drag_stopped();
         response.on_hover_text("Drag from one point to another to measure time and depth");
-        if let Some(span) = &panel.span {
+        for (letter, span) in ('A'..='Z').zip(&panel.spans) {
             let line = Stroke::new(1.5, style::ACCENT);
             let painter = ui.painter_at(inner);
             painter.line_segment([at(span.from), at(span.to)], line);
             for end in [span.from, span.to] {
                 painter.circle_stroke(at(end), 4.0, line);
             }
+            let place = at(span.to) + vec2(6.0, -6.0);
+            let font = FontId::proportional(12.0);
+            painter.text(place, Align2::LEFT_BOTTOM, letter, font, style::ACCENT);
         }
     });
 }
 
-fn line(ui: &mut Ui, strip: &mut Strip, scanlines: u32) {
+fn line(ui: &mut Ui, strip: &mut Strip, probe: &Probe) {
     ui.horizontal(|ui| {
-        ui.label("Line");
-        let mut line = strip.line() + 1;
-        let drag = DragValue::new(&mut line).range(1..=scanlines).speed(0.3);
-        let tip = "Scanline that is drawn; its mark in the image can be dragged, too";
-        ui.add(drag).on_hover_text(tip);
-        strip.aim(line - 1);
+        let free = matches!(strip.line(), Aim::Free(_));
+        if ui.selectable_label(!free, "Line").clicked() && free {
+            let [from, to] = strip.line().ends(probe);
+            let middle = from.midpoint(to);
+            strip.aim(Aim::Scanline(nearest_line(probe, middle.x, middle.y)));
+        }
+        if let Aim::Scanline(line) = strip.line() {
+            let mut number = line + 1;
+            let drag = DragValue::new(&mut number).range(1..=probe.scanlines).speed(0.3);
+            let tip = "Scanline that is drawn; its mark in the image can be dragged, too";
+            ui.add(drag).on_hover_text(tip);
+            strip.aim(Aim::Scanline(number - 1));
+        }
+        let tip = "Anatomical M-mode: along any line, whose ends are dragged in the image. It is taken from the \
+                   images, so that it has as many columns as there are images.";
+        if ui.selectable_label(free, "Free").on_hover_text(tip).clicked() && !free {
+            strip.aim(Aim::Free(strip.line().ends(probe)));
+        }
     });
 }
 
@@ -125,29 +190,45 @@ fn width(ui: &mut Ui, panel: &mut Panel) {
     });
 }
 
-fn remarks(ui: &mut Ui, strip: &Strip, animated: bool, panel: &Panel) {
+fn remarks(ui: &mut Ui, strip: &Strip, animated: bool, speed: f64, panel: &Panel) {
     let end = strip.newest().unwrap_or_default();
     if !animated {
         ui.small("Nothing in this scene moves: time is that of the images.");
-    } else if end > panel.window && strip.columns_in(end, panel.window) < FEW {
-        let text = "Few images in this time: slow the animation down for a finer strip.";
+        return;
+    }
+    let columns = strip.columns_in(end, panel.window) as f64;
+    let covered = panel.window.min(strip.span());
+    if covered <= 0.0 {
+        return;
+    }
+    let rate = columns / covered;
+    ui.small(format!("{rate:.0} columns per second"));
+    if end > panel.window && rate < FEW {
+        let slower = speed * (rate / FEW).max(0.01);
+        let text =
+            format!("Slow the animation down for a finer strip: {slower:.2}x gives {FEW:.0}.");
         ui.small(egui::RichText::new(text).color(style::WARN));
     }
 }
 
-fn measured(ui: &mut Ui, span: Option<Span>) {
-    let Some(span) = span else {
+fn measured(ui: &mut Ui, panel: &mut Panel) {
+    if panel.spans.is_empty() {
         ui.small("Drag in the strip to measure.");
         return;
-    };
-    let number = |value: Option<f64>, unit: &str| match value {
-        Some(value) => format!("{value:.0} {unit}"),
-        None => format!("- {unit}"),
-    };
-    ui.monospace(format!("{:.0} ms", span.seconds() * 1e3));
-    ui.monospace(format!("{:.1} mm", span.millimetres()));
-    ui.monospace(number(span.per_minute(), "/min"));
-    ui.monospace(number(span.speed(), "mm/s"));
+    }
+    for (letter, span) in ('A'..='Z').zip(&panel.spans) {
+        ui.monospace(format!(
+            "{letter} {:.1} mm  {:.0} ms",
+            span.millimetres(),
+            span.seconds() * 1e3
+        ));
+        if let (Some(rate), Some(speed)) = (span.per_minute(), span.speed()) {
+            ui.monospace(format!("  {rate:.0} /min  {speed:.0} mm/s"));
+        }
+    }
+    if ui.small_button("Clear").on_hover_text("Remove the measurements of the strip").clicked() {
+        panel.spans.clear();
+    }
 }
 
 fn draw(ui: &Ui, strip: &Strip, panel: &mut Panel, inner: Rect, end: f64) {
@@ -192,29 +273,41 @@ fn rulers(ui: &Ui, inner: Rect, depth: f64, window: f64, end: f64) {
     }
 }
 
-/// Draws the scanline into the image; the mark below it moves it.
+/// Draws the line into the image; marks at its ends move it.
 pub(super) fn aim(ui: &mut Ui, place: &Place, frame: &Frame, strip: &mut Strip, frozen: bool) {
     let probe = &frame.probe;
-    let line = strip.line().min(probe.scanlines - 1);
-    let (start, direction) = probe.ray(line, probe.elevation_layers / 2);
-    let end = start + direction * probe.depth;
-    let ends = [place.at(start.x, start.z), place.at(end.x, end.z)];
-    let dashes = egui::Shape::dashed_line(&ends, Stroke::new(1.0, style::ACCENT), 6.0, 6.0);
+    let ends = strip.line().ends(probe);
+    let points = ends.map(|end| place.at(end.x, end.y));
+    let dashes = egui::Shape::dashed_line(&points, Stroke::new(1.0, style::ACCENT), 6.0, 6.0);
     ui.painter().extend(dashes);
-    // A frozen strip has nothing to show of another scanline.
+    // A frozen strip has nothing to show of another line.
     if frozen {
         return;
     }
-    let mark = Rect::from_center_size(ends[1], vec2(16.0, 16.0));
-    let response = ui.interact(mark, ui.id().with("M-mode line"), Sense::drag());
-    let colour = match response.hovered() || response.dragged() {
-        true => style::TEXT,
-        false => style::ACCENT,
-    };
-    ui.painter().circle_filled(ends[1], 5.0, colour);
-    if let (true, Some(point)) = (response.dragged(), response.interact_pointer_pos()) {
-        let [lateral, depth] = place.mm(point).to_array();
-        strip.aim(nearest_line(probe, lateral, depth));
+    for (i, point) in points.into_iter().enumerate() {
+        let free = matches!(strip.line(), Aim::Free(_));
+        // A scanline begins at the face.
+        if i == 0 && !free {
+            continue;
+        }
+        let mark = Rect::from_center_size(point, vec2(16.0, 16.0));
+        let response = ui.interact(mark, ui.id().with(("M-mode line", i)), Sense::drag());
+        let colour = match response.hovered() || response.dragged() {
+            true => style::TEXT,
+            false => style::ACCENT,
+        };
+        ui.painter().circle_filled(point, 5.0, colour);
+        if let (true, Some(under)) = (response.dragged(), response.interact_pointer_pos()) {
+            let mm = place.mm(under);
+            strip.aim(match free {
+                false => Aim::Scanline(nearest_line(probe, mm.x, mm.y)),
+                true => {
+                    let mut ends = ends;
+                    ends[i] = DVec2::new(mm.x, mm.y);
+                    Aim::Free(ends)
+                }
+            });
+        }
+        response.on_hover_text("The line of the M-mode strip: drag it");
     }
-    response.on_hover_text("The line of the M-mode strip: drag it");
 }

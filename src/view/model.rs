@@ -13,8 +13,10 @@ mod layer;
 pub mod mmode;
 mod pad;
 mod pose;
+mod poses;
 pub mod real;
 pub mod registration;
+mod resuming;
 mod saving;
 mod settings;
 pub mod sheet;
@@ -36,19 +38,22 @@ pub use devices::{Devices, Source};
 use history::History;
 use hold::Hold;
 pub use layer::Layer;
-use mmode::Strip;
+use mmode::{Aim, Strip};
 pub use pad::{Control, Pad, Press};
 pub use pose::{Axis, STEP, moved};
+pub use poses::KnownPose;
 use real::Real;
 use registration::Registration;
+pub use resuming::Leftover;
 pub use saving::File;
 pub use settings::Settings;
+use sheet::{Mark, Sheet};
 use trajectory::Replay;
 pub use trajectory_state::{StoredTrajectory, TrajectoryState};
 pub use view3d::{Shown, View3d};
 
-use super::engine::{Frame, Pixels};
-use crate::scene::Scene;
+use super::engine::{Film, Frame};
+use crate::scene::{NamedPose, Scene, Task};
 use crate::sim::Tracer;
 use crate::sim::fusion::Tint;
 
@@ -92,7 +97,18 @@ pub struct Model {
     pub real: Real,
     /// The tissues that are seen, in colours.
     pub layer: Layer,
+    /// Tasks of the scene.
+    pub tasks: Vec<Task>,
+    /// Named poses of the probe, and those that the file has.
+    poses: Vec<KnownPose>,
+    filed_poses: Vec<NamedPose>,
+    /// Measurements and texts.
+    pub sheet: Sheet,
+    /// The marks at the last step of the history.
+    noted_marks: Vec<Mark>,
     history: History,
+    /// Number of times that it was saved.
+    saves: u64,
     revision: u64,
     opened: Instant,
     changed: Instant,
@@ -130,8 +146,8 @@ pub struct Order {
     replay: Option<Replay>,
     /// Time of the scene.
     pub clock: Clock,
-    /// True where the picture's pixels are also wanted outside the device.
-    pub reads_back: bool,
+    /// The line of the M-mode strip, while it is drawn.
+    pub mmode: Option<Aim>,
     /// Number that grows with every change.
     pub revision: u64,
     /// Time of the change: the arrival of the input event.
@@ -193,7 +209,13 @@ impl Model {
             file,
             real: Real::default(),
             layer: Layer::default(),
+            tasks: scene.tasks.clone(),
+            poses: KnownPose::of(&scene.poses),
+            filed_poses: scene.poses.clone(),
+            sheet: Sheet::default(),
+            noted_marks: Vec::new(),
             history: History::default(),
+            saves: 0,
             revision: 0,
             opened: now,
             changed: now,
@@ -215,6 +237,9 @@ impl Model {
 
     /// Puts the probe somewhere, for a device other than the tracker.
     pub fn place_probe(&mut self, source: Source, pose: DAffine3, now: Instant) {
+        if pose != self.pose {
+            self.note_pose(source, now);
+        }
         self.devices.take(source);
         self.settle(source.name(), pose, now);
     }
@@ -222,7 +247,11 @@ impl Model {
     /// Takes the pose of the tracker's `tool` (world from probe); the probe goes there unless another
     /// device has moved it since.
     pub fn track(&mut self, tool: &str, pose: DAffine3, now: Instant) {
+        let had = self.devices.holder() == Some(Source::Tracker);
         if self.devices.track(pose) {
+            if !had {
+                self.note_pose(Source::Tracker, now);
+            }
             self.settle(tool, pose, now);
         }
     }
@@ -246,19 +275,6 @@ impl Model {
         self.touch(now);
     }
 
-    /// Notes that the settings were `before` until now.
-    pub fn note(&mut self, before: &Settings, now: Instant) {
-        if *before != self.settings {
-            self.unite(before);
-            self.carry_skin(before);
-            let (origins, lattice) = (&self.file.origins, self.file.lattice);
-            let changes = entries::changes(before, &self.settings, origins, lattice);
-            let paths = changes.into_iter().map(|(path, _)| path).collect();
-            self.history.push(before.clone(), paths, now);
-            self.touch(now);
-        }
-    }
-
     /// Moves the skin with the model; the settings were `before`.
     fn carry_skin(&mut self, before: &Settings) {
         if let Some(hold) = &mut self.hold
@@ -274,29 +290,9 @@ impl Model {
         self.changed = now;
     }
 
-    /// Goes back by one change of the settings, if there is one.
-    pub fn undo(&mut self, now: Instant) {
-        let earlier = self.history.undo(self.settings.clone());
-        self.change(earlier, now);
-    }
-
-    /// Goes forward again.
-    pub fn redo(&mut self, now: Instant) {
-        let later = self.history.redo(self.settings.clone());
-        self.change(later, now);
-    }
-
-    fn change(&mut self, settings: Option<Settings>, now: Instant) {
-        if let Some(settings) = settings {
-            let before = std::mem::replace(&mut self.settings, settings);
-            self.carry_skin(&before);
-            self.touch(now);
-        }
-    }
-
-    /// Returns whether there is something to undo, and to redo.
-    pub fn undoable(&self) -> [bool; 2] {
-        self.history.depth().map(|n| n > 0)
+    /// Number that grows whenever it is saved.
+    pub fn saves(&self) -> u64 {
+        self.saves
     }
 
     /// Number that grows with every change.
@@ -306,13 +302,26 @@ impl Model {
 
     /// Adds a picture to the M-mode strip, if it is drawn. Where nothing in the scene moves, the strip's
     /// time is that of the pictures: only the probe moves then.
-    pub fn film(&mut self, frame: &Frame, pixels: &Pixels) {
-        if let Some(strip) = &mut self.mmode {
-            let seconds = match self.animated {
-                true => frame.seconds,
-                false => frame.at.duration_since(self.opened).as_secs_f64(),
-            };
-            strip.add(seconds, &frame.probe, frame.sector, pixels);
+    pub fn film(&mut self, frame: &Frame, film: Film) {
+        let (animated, opened) = (self.animated, self.opened);
+        let time = |seconds: f64, at: Instant| match animated {
+            true => seconds,
+            false => at.duration_since(opened).as_secs_f64(),
+        };
+        let Some(strip) = &mut self.mmode else { return };
+        match film {
+            Film::None => {}
+            Film::Picture(pixels) => {
+                let seconds = time(frame.seconds, frame.at);
+                strip.add_image(seconds, &frame.probe, frame.sector, &pixels);
+            }
+            // Those of the line before come to nothing.
+            Film::Columns(aim, _) if aim != strip.line() => {}
+            Film::Columns(_, columns) => {
+                for column in columns {
+                    strip.add(time(column.seconds, column.at), &frame.probe, column.levels);
+                }
+            }
         }
     }
 
@@ -325,7 +334,7 @@ impl Model {
             pose: self.pose,
             clock: self.clock,
             replay: self.trajectory.replay.clone(),
-            reads_back: self.mmode.is_some(),
+            mmode: self.mmode.as_ref().map(Strip::line),
             revision: self.revision,
             at: self.changed,
         }

@@ -1,9 +1,12 @@
-//! The warning over the image that the tracker is lost.
+//! Badges over the image: the tracker is lost, the probe's trajectory is being recorded.
 
-use egui::{Align2, Color32, FontId, Rect, Ui, vec2};
+use std::time::{Duration, Instant};
+
+use egui::{Align2, Area, Color32, FontId, Frame, Id, Rect, RichText, ScrollArea, Ui, vec2};
 
 use super::inputs::Inputs;
-use super::model::age;
+use super::model::{Model, age};
+use super::state::State;
 use super::style;
 use crate::igtl::TrackerState;
 
@@ -29,4 +32,49 @@ pub(super) fn show(ui: &Ui, inputs: &Inputs) {
     painter.rect_filled(badge, 4.0, style::WARN);
     let at = Align2::CENTER_CENTER.align_size_within_rect(words.size(), badge);
     painter.galley(at.min, words, Color32::BLACK);
+}
+
+/// Draws a red sign beside the word for live or frozen while the probe's trajectory is being recorded.
+pub(super) fn recording(ui: &Ui, model: &Model, now: Instant) {
+    let Some(recorder) = &model.trajectory.recorder else {
+        return;
+    };
+    let (painter, area) = (ui.painter(), ui.max_rect());
+    let text = format!("REC {:.0} s", recorder.seconds(now).floor());
+    let font = FontId::proportional(15.0);
+    let corner = area.right_top() + vec2(-76.0, 8.0);
+    let words = painter.text(corner, Align2::RIGHT_TOP, text, font, style::RED);
+    painter.circle_filled(words.left_center() - vec2(11.0, 0.0), 5.0, style::RED);
+    // The seconds count on while nothing else is drawn.
+    ui.ctx().request_repaint_after(Duration::from_secs(1));
+}
+
+/// Draws the reason why the scene's files, which have changed, cannot be used, at the image's lower edge.
+pub(super) fn stale(ui: &Ui, problem: Option<&str>) {
+    let Some(problem) = problem else { return };
+    let area = ui.max_rect();
+    Area::new(Id::new("stale"))
+        .pivot(Align2::CENTER_BOTTOM)
+        .fixed_pos(area.center_bottom() - vec2(0.0, 60.0))
+        .constrain_to(area)
+        .show(ui.ctx(), |ui| {
+            Frame::popup(ui.style()).show(ui, |ui| {
+                ui.set_max_width(440.0);
+                ui.label("The scene's files have changed and cannot be used; the image goes on as it was:");
+                ui.label(RichText::new(problem).color(style::WARN));
+            });
+        });
+}
+
+/// Lists what is suspicious about the scene, where that is wanted.
+pub(super) fn warnings(ctx: &egui::Context, state: &mut State) {
+    let State { warnings, warned, .. } = state;
+    style::window("Warnings", 64.0).open(warned).show(ctx, |ui| {
+        ui.set_max_width(460.0);
+        ScrollArea::vertical().max_height(300.0).show(ui, |ui| {
+            for warning in warnings.iter() {
+                ui.label(RichText::new(warning).color(style::WARN));
+            }
+        });
+    });
 }

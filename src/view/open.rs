@@ -5,28 +5,25 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use winit::event::WindowEvent;
-use winit::event_loop::{ActiveEventLoop, EventLoopProxy};
+use winit::event_loop::EventLoopProxy;
 use winit::window::Window;
 
 use super::deaths::Deaths;
 use super::engine::{Frame, News};
-use super::files::Files;
-use super::inputs::{self, Inputs};
-use super::link::{Bell, Link};
+use super::leaving::{self, Way};
+use super::link::Link;
 use super::look::{Look, Pictured};
-use super::model::{File, StoredTrajectory};
-use super::opening::{self, Opened, Opening};
+use super::opening::{Opened, Opening};
 use super::session::{self, Session, Wake};
 use super::state::State;
-use super::timing;
 use super::tools::Tools;
-use super::{Model, Options, ViewError, keys, planes, style, view3d};
-use crate::gpu::{Device, ValidationLog};
-use crate::output;
+use super::watch::Watch;
+use super::{Model, Options, ViewError, keys, orders};
+use crate::gpu::Device;
 use crate::scene::Scene;
-use crate::sim;
 
 mod gestures;
+mod making;
 mod paint;
 mod scenes;
 
@@ -63,6 +60,10 @@ pub(super) struct Open {
     window: Arc<Window>,
     title: String,
     opening: Option<Opening>,
+    /// The scene's files, watched for changes.
+    watch: Watch,
+    /// Number of savings that the watch knows of.
+    saved: u64,
     /// A scene that has been handed to the simulation.
     coming: Option<Opened>,
 }
@@ -94,131 +95,7 @@ impl Plan {
     }
 }
 
-/// Input for a window on `device`, its interface `zoom` times as large as usual. The textures of an
-/// earlier interface are lost with its device: this one sends them again.
-fn interface(window: &Window, zoom: f32, device: &Device) -> egui_winit::State {
-    let context = egui::Context::default();
-    context.set_zoom_factor(zoom);
-    let scale = window.scale_factor() as f32;
-    style::apply(&context);
-    let root = egui::ViewportId::ROOT;
-    let limit = device.limits().max_image_2d as usize;
-    egui_winit::State::new(context, root, window, Some(scale), None, Some(limit))
-}
-
 impl Open {
-    /// Opens a window. The log is the device's.
-    pub(super) fn new(
-        events: &ActiveEventLoop,
-        plan: &mut Plan,
-    ) -> Result<(Self, ValidationLog), ViewError> {
-        let window = session::window(events, &plan.scene.name)?;
-        let device = session::device(&plan.options, &window)?;
-        let (options, now) = (&plan.options, Instant::now());
-        let scene = plan.scene.clone();
-        let file = File::new(options.file.clone(), options.overrides.clone(), &scene);
-        let suited = opening::suited(scene, file, options, &device, options.seconds, now);
-        let Opened { scene, mut model } = suited.map_err(ViewError::Refused)?;
-        if let Some((track, file)) = plan.options.trajectory.take() {
-            model.await_replay(StoredTrajectory::loaded(track, inputs::name(&file)), now);
-        }
-        plan.scene = scene;
-        let machine = sim::machine(&device);
-        let (link, bell) = (plan.link.clone(), Bell::new(plan.proxy.clone()));
-        let inputs = Inputs::new(link, bell, plan.scene.tracker.clone(), plan.options.listen)?;
-        if let Some(address) = inputs.address() {
-            output::line(format!("listening at {address} (OpenIGTLink)"));
-        }
-        let state = State {
-            console: true,
-            timing: false,
-            view3d: view3d::State::default(),
-            planes: planes::State::default(),
-            times: timing::Page::default(),
-            help: false,
-            mmode: Default::default(),
-            tissue: 0,
-            mesh: 0,
-            machine,
-            files: Files::default(),
-            ray_query: device.supports_ray_query(),
-            heap: device.info().memory_bytes,
-            device: format!("{} ({})", device.name(), device.driver()),
-            problem: None,
-            deaths: plan.deaths.clone(),
-            stopped: false,
-            restart: false,
-            preparing: "Opening the device",
-            tools: plan.tools(&device),
-            inputs,
-            quit: false,
-        };
-        let input = interface(&window, plan.options.scale, &device);
-        let log = device.validation_log();
-        let session = plan.session(device, &window, &model)?;
-        window.request_redraw();
-        Ok((Self::with(session, model, state, input, window), log))
-    }
-
-    /// The same window with another simulation on a new device; `problem` is shown in it. The log is the new
-    /// device's.
-    pub(super) fn again(
-        self,
-        plan: &Plan,
-        problem: Option<String>,
-    ) -> Result<(Self, ValidationLog), ViewError> {
-        let Self {
-            frame, pictured, session, model, mut state, input, window, title, opening, ..
-        } = self;
-        // A scene handed over is lost with the device; the user can open it again.
-        state.files.opening = opening.is_some();
-        // Everything on the lost device is dropped before there is another.
-        drop((frame, pictured));
-        state.tools.lose();
-        drop(session);
-        let device = session::device(&plan.options, &window)?;
-        // Its texture is lost with the device.
-        state.mmode = Default::default();
-        state.problem = problem;
-        (state.stopped, state.restart) = (false, false);
-        let input = interface(&window, input.egui_ctx().zoom_factor(), &device);
-        let log = device.validation_log();
-        let session = plan.session(device, &window, &model)?;
-        window.request_redraw();
-        let made = Self { title, opening, ..Self::with(session, model, state, input, window) };
-        Ok((made, log))
-    }
-
-    /// A window before its first picture.
-    fn with(
-        session: Session,
-        model: Model,
-        state: State,
-        input: egui_winit::State,
-        window: Arc<Window>,
-    ) -> Self {
-        Self {
-            frame: None,
-            pictured: None,
-            session,
-            told: model.revision(),
-            look: None,
-            model,
-            state,
-            fresh: false,
-            pictures_ms: Vec::new(),
-            touched: Instant::now(),
-            painted: (Instant::now(), Duration::ZERO),
-            awaited: false,
-            again: None,
-            input,
-            window,
-            title: String::new(),
-            opening: None,
-            coming: None,
-        }
-    }
-
     /// Takes over what simulation and devices have to say; an error after which nothing more will
     /// come.
     pub(super) fn listen(&mut self, plan: &mut Plan) -> Result<(), ViewError> {
@@ -227,15 +104,13 @@ impl Open {
         for news in self.session.engine.news() {
             pictures_only &= matches!(news, News::View3d(_));
             match news {
-                News::Frame(frame, pixels) => {
+                News::Frame(frame, film) => {
                     self.awaited = false;
                     self.model.follow(Instant::now());
                     if self.frame.is_none() {
                         self.model.begin_replay(Instant::now());
                     }
-                    if let Some(pixels) = pixels {
-                        self.model.film(&frame, &pixels);
-                    }
+                    self.model.film(&frame, film);
                     self.state.tools.record((*frame).clone());
                     self.state.view3d.pace(frame.grade.budget_ms);
                     self.frame = Some(*frame);
@@ -328,13 +203,39 @@ impl Open {
             self.again = None;
             self.window.request_redraw();
         }
-        self.again.into_iter().chain(self.state.inputs.due).min()
+        let kept = match self.state.quit {
+            true => None,
+            false => self.keep(now),
+        };
+        self.again.into_iter().chain(self.state.inputs.due).chain(kept).min()
+    }
+
+    /// Keeps what is unsaved; returns when to do so again.
+    fn keep(&mut self, now: Instant) -> Option<Instant> {
+        let mut keeper = std::mem::take(&mut self.state.keeper);
+        let due = keeper.keep(&self.model, &self.state, now);
+        self.state.keeper = keeper;
+        due
+    }
+
+    /// Ends the session as the user wants it: nothing is kept.
+    pub(super) fn end(&mut self) {
+        self.state.keeper.forget();
     }
 
     /// Takes over the news of the devices.
     fn look(&mut self) {
         if self.state.inputs.look(&mut self.model) {
             self.session.engine.send_again();
+        }
+        while let Some(request) = self.state.inputs.request() {
+            let (now, mut wanted) = (Instant::now(), None);
+            let outcome = orders::carry_out(&request.order, &mut self.model, &mut wanted, now);
+            if let Some(path) = wanted {
+                leaving::leave(Way::Open(path), &mut self.model, &mut self.state, now);
+            }
+            request.answer(outcome);
+            self.window.request_redraw();
         }
         let word = self.state.inputs.word.clone();
         keys::apply_pads(&word, &mut self.model, &mut self.state, Instant::now());
@@ -360,7 +261,13 @@ impl Open {
         self.state.restart
     }
 
-    /// The user wants to leave.
+    /// The user wants to close the window: asks first what becomes of unsaved work.
+    pub(super) fn leave(&mut self) {
+        leaving::leave(Way::Quit, &mut self.model, &mut self.state, Instant::now());
+        self.window.request_redraw();
+    }
+
+    /// The user leaves.
     pub(super) fn is_done(&self) -> bool {
         self.state.quit
     }

@@ -8,6 +8,7 @@ use std::time::Instant;
 use winit::event_loop::EventLoopProxy;
 
 use super::deaths::OPENING;
+use super::keeper::Orphan;
 use super::model::{File, Model};
 use super::session::Wake;
 use super::{Options, Refusal};
@@ -16,10 +17,21 @@ use crate::scene::{Scene, SceneError, Warning};
 
 type Loaded = Result<(Scene, Vec<Warning>), SceneError>;
 
+/// The purpose for which a scene is loaded.
+pub(super) enum Purpose {
+    /// It takes the place of the one that is shown.
+    Open,
+    /// It is the one that is shown, whose files have changed: the session goes on with it.
+    Again,
+    /// Settings and poses of an earlier session that were not saved: the scene that is shown gets them.
+    TakeUp(Box<Orphan>),
+}
+
 /// A scene being loaded.
 pub(super) struct Opening {
     path: PathBuf,
     overrides: Vec<(String, String)>,
+    pub(super) purpose: Purpose,
     loaded: Receiver<Loaded>,
 }
 
@@ -27,6 +39,10 @@ pub(super) struct Opening {
 pub(super) struct Opened {
     pub(super) scene: Scene,
     pub(super) model: Model,
+    /// What is suspicious about it.
+    pub(super) warnings: Vec<String>,
+    /// The session goes on with it.
+    pub(super) again: bool,
 }
 
 impl Opening {
@@ -34,6 +50,7 @@ impl Opening {
     pub(super) fn begin(
         path: PathBuf,
         overrides: Vec<(String, String)>,
+        purpose: Purpose,
         proxy: EventLoopProxy<Wake>,
     ) -> Self {
         let (sender, loaded) = channel();
@@ -45,7 +62,7 @@ impl Opening {
             let _ = sender.send(Scene::load(&file, &set));
             let _ = proxy.send_event(Wake);
         });
-        Self { path, overrides, loaded }
+        Self { path, overrides, purpose, loaded }
     }
 
     /// The loaded scene, fitted to the device; none while it is not ready.
@@ -66,7 +83,11 @@ impl Opening {
                     crate::output::note(warning);
                 }
                 let file = File::new(self.path.clone(), self.overrides.clone(), &scene);
-                suited(scene, file, options, device, 0.0, now).map_err(|e| e.to_string())
+                let suited = suited(scene, file, options, device, 0.0, now);
+                let again = matches!(self.purpose, Purpose::Again);
+                let warnings = warnings.iter().map(ToString::to_string).collect();
+                let opened = |opened| Opened { warnings, again, ..opened };
+                suited.map(opened).map_err(|e| e.to_string())
             }
             Err(error) => Err(super::files::said(&error)),
         })
@@ -93,5 +114,5 @@ pub(super) fn suited(
 ) -> Result<Opened, Refusal> {
     let tracer = (options.prepare)(device, &mut scene)?;
     let model = Model::new(&scene, file, tracer, seconds, now);
-    Ok(Opened { scene, model })
+    Ok(Opened { scene, model, warnings: Vec::new(), again: false })
 }

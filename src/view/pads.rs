@@ -10,6 +10,7 @@ use parking_lot::Mutex;
 use super::deaths::PADS;
 use super::link::Bell;
 use super::model::{Axis, Control, Pad, Press};
+use crate::gpu::unreadable_pad;
 
 /// Time between movements of the probe while a stick is held, which sends no events meanwhile.
 const TICK: Duration = Duration::from_millis(16);
@@ -147,28 +148,13 @@ impl Listener {
 }
 
 /// Returns a message where there is a pad that this user may not read.
-#[cfg(target_os = "linux")]
 fn unreadable() -> Option<String> {
-    let devices = std::fs::read_dir("/dev/input").ok()?;
-    let joystick = devices.flatten().find(|device| {
-        let name = device.file_name();
-        name.to_string_lossy().starts_with("js")
-    })?;
-    let error = std::fs::File::open(joystick.path()).err()?;
-    let denied = error.kind() == std::io::ErrorKind::PermissionDenied;
-    denied.then(|| {
-        format!(
-            "there is a game pad ({}), which you may not read: your user has to be allowed to, for \
-             instance by the group `input`",
-            joystick.path().display()
-        )
-    })
-}
-
-/// Elsewhere the system hands pads to every user.
-#[cfg(not(target_os = "linux"))]
-fn unreadable() -> Option<String> {
-    None
+    let device = unreadable_pad()?;
+    Some(format!(
+        "there is a game pad ({}), which you may not read: your user has to be allowed to, for \
+         instance by the group `input`",
+        device.display()
+    ))
 }
 
 /// The axes of a travel with their amounts, those that are not zero.

@@ -21,10 +21,15 @@ pub(super) struct Notices {
 }
 
 impl Notices {
-    /// Adds a message that something was saved.
-    pub(super) fn saved(&mut self, text: String) {
+    /// Adds a message that something was done.
+    pub(super) fn tell(&mut self, text: String) {
         self.failed = None;
         self.saved.push((text, Instant::now() + SHOWN));
+    }
+
+    /// Returns whether the last capture was not saved.
+    pub(super) fn has_failed(&self) -> bool {
+        self.failed.is_some()
     }
 
     /// Sets the message that something could not be saved.

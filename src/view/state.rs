@@ -1,9 +1,13 @@
 //! The state of the window itself: open panels and choices; not saved.
 
+use super::console;
 use super::deaths::Deaths;
 use super::files::Files;
 use super::inputs::Inputs;
+use super::keeper::{Keeper, Orphan};
+use super::leaving::Leaving;
 use super::mmode;
+use super::naming;
 use super::timing;
 use super::tools::Tools;
 use crate::settings::Machine;
@@ -12,6 +16,8 @@ use crate::settings::Machine;
 pub(super) struct State {
     /// True while the console is open.
     pub(super) console: bool,
+    /// The part of the image that is seen.
+    pub(super) framing: super::framing::Framing,
     /// True while the timing panel is open.
     pub(super) timing: bool,
     /// The 3D view.
@@ -22,8 +28,16 @@ pub(super) struct State {
     pub(super) times: timing::Page,
     /// True while the list of keys is open.
     pub(super) help: bool,
+    /// Pictures of the scenes that ship.
+    pub(super) gallery: super::gallery::Gallery,
+    /// The worksheet of the examination.
+    pub(super) exam: super::exam::Examination,
+    /// Tasks of the scene.
+    pub(super) lesson: super::lesson::Lesson,
     /// The M-mode panel.
     pub(super) mmode: mmode::Panel,
+    /// Names of poses that are being typed.
+    pub(super) poses: console::Naming,
     /// Tissue under inspection: index into the scene's.
     pub(super) tissue: usize,
     /// Mesh under inspection: index into the scene's instances.
@@ -52,6 +66,30 @@ pub(super) struct State {
     pub(super) tools: Tools,
     /// The devices that move the probe.
     pub(super) inputs: Inputs,
+    /// A way out on which something unsaved would be lost.
+    pub(super) leaving: Option<Leaving>,
+    /// Keeps what is unsaved.
+    pub(super) keeper: Keeper,
+    /// What an earlier session has left unsaved, until the user has decided; and what is to be taken up.
+    pub(super) offer: Option<Orphan>,
+    pub(super) taken_up: Option<Orphan>,
+    /// Where the pointer asks what lies there; the answer; the settings of it that are wanted.
+    pub(super) asked: Option<(egui::Pos2, naming::Question)>,
+    pub(super) answer: Option<naming::Answer>,
+    pub(super) wanted: Option<naming::Wanted>,
+    /// The reason why changed files of the scene cannot be used.
+    pub(super) stale: Option<String>,
+    /// What is suspicious about the scene.
+    pub(super) warnings: Vec<String>,
+    /// True while these are shown.
+    pub(super) warned: bool,
     /// True once the window is to be closed.
     pub(super) quit: bool,
+}
+
+impl State {
+    /// Returns whether a dialog has the keyboard.
+    pub(super) fn has_dialog(&self) -> bool {
+        self.leaving.is_some() || self.offer.is_some() || self.files.is_asking()
+    }
 }

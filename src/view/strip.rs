@@ -8,7 +8,7 @@ use egui::{
 
 use super::calipers::{cross, dots};
 use super::model::calipers::Kind;
-use super::model::sheet::Tool;
+use super::model::sheet::{Sheet, Tool};
 use super::tools::Tools;
 
 /// Height of a button with the gap below it, points; where there is little room, and otherwise.
@@ -20,7 +20,7 @@ const LITTLE: f32 = 420.0;
 type Icon = fn(&Painter, Rect, Color32);
 
 /// The tools of the pointer: sign and meaning.
-const TOOLS: [(Tool, &str, Icon); 4] = [
+const TOOLS: [(Tool, &str, Icon); 5] = [
     (Tool::Measure(Kind::Distance), "Distance in mm: two clicks, or drag (L)", |p, r, c| {
         dots(p, &[r.left_bottom(), r.right_top()], c);
         cross(p, r.left_bottom(), c);
@@ -42,6 +42,16 @@ const TOOLS: [(Tool, &str, Icon); 4] = [
             let line = Stroke::new(1.5, c);
             p.line_segment([r.left_bottom(), r.right_top()], line);
             p.line_segment([r.left_bottom(), r.right_bottom()], line);
+        },
+    ),
+    (
+        Tool::Measure(Kind::Trace),
+        "Trace, its circumference and area: draw it, or click along it and then on its beginning (J)",
+        |p, r, c| {
+            let side = |x: f32, y: f32| r.center() + vec2(x * r.width(), y * r.height());
+            let outline =
+                [(-0.6, 0.1), (-0.2, -0.5), (0.5, -0.4), (0.6, 0.3), (0.0, 0.5), (-0.6, 0.1)];
+            dots(p, &outline.map(|(x, y)| side(x, y)), c);
         },
     ),
     (Tool::Note, "Text: click to place it, or drag away from what it points at (N)", |p, r, c| {
@@ -76,9 +86,9 @@ fn film(p: &Painter, r: Rect, c: Color32) {
 }
 
 /// Draws the toolbar into the lower left corner.
-pub(super) fn show(ui: &mut Ui, tools: &mut Tools) {
+pub(super) fn show(ui: &mut Ui, tools: &mut Tools, sheet: &mut Sheet) {
     let area = ui.max_rect();
-    let has_marks = !tools.sheet.marks().is_empty();
+    let has_marks = !sheet.marks().is_empty();
     let pitch = PITCH[usize::from(area.height() > LITTLE)];
     let height = pitch * (TOOLS.len() as f32 + 3.0) + 6.0;
     let mut at = pos2(area.left() + 8.0, area.bottom() - 8.0 - height);
@@ -88,13 +98,13 @@ pub(super) fn show(ui: &mut Ui, tools: &mut Tools) {
         rect
     };
     for (tool, tip, icon) in TOOLS {
-        if button(ui, next(0.0), tools.sheet.tool() == Some(tool), true, tip, icon) {
-            tools.sheet.toggle(tool);
+        if button(ui, next(0.0), sheet.tool() == Some(tool), true, tip, icon) {
+            sheet.toggle(tool);
         }
     }
-    let tip = "Remove all measurements and texts";
+    let tip = "Remove all measurements and texts; Undo brings them back";
     if button(ui, next(6.0), false, has_marks, tip, bin) {
-        tools.sheet.clear();
+        sheet.clear();
     }
     let has_image = !tools.cine.is_empty();
     let tip = "Save this image: PNG and sidecar (F2)";

@@ -14,6 +14,8 @@ pub(super) const TEXT: Color32 = Color32::from_rgb(208, 212, 216);
 pub(super) const FAINT: Color32 = Color32::from_rgb(140, 146, 152);
 /// Warnings and errors.
 pub(super) const WARN: Color32 = Color32::from_rgb(232, 170, 84);
+/// A recording under way.
+pub(super) const RED: Color32 = Color32::from_rgb(236, 70, 64);
 
 /// Sets up the interface's look.
 pub(super) fn apply(ctx: &egui::Context) {

@@ -7,15 +7,16 @@ use std::time::Instant;
 use glam::{DAffine3, DVec2};
 use serde_json::{Value, json};
 
-use super::captures::{Captures, Clip, Format, Sidecar, Still};
+use super::captures::{Captures, Clip, Format, SavedStrip, Sidecar, Still};
 use super::engine::Frame;
 use super::model::cine::Limit;
-use super::model::sheet::{Moment, Sheet};
-use super::model::sidecar::{self, Area};
+use super::model::sheet::{Mark, Moment, Sheet};
+use super::model::sidecar;
 use super::model::{Axis, Cine, Model};
 use super::saved::Notices;
+use crate::exam::Report;
 use crate::gpu::{DeviceInfo, Image, Screenshot};
-use crate::sim::facts;
+use crate::sim::facts::{self, Area};
 
 /// Most frames of the loop.
 const FRAMES: usize = 256;
@@ -34,8 +35,8 @@ pub(super) struct Tools {
     /// The last images, all of one place in the probe's space: another depth begins another loop, as on a scanner.
     /// An image made finer at rest replaces its coarser one.
     pub(super) cine: Cine<Frame>,
-    /// Measurements and texts.
-    pub(super) sheet: Sheet,
+    /// The marks that the last saved image holds.
+    filed: Vec<Mark>,
     /// Captures being saved.
     pub(super) captures: Captures,
     /// Folder of the captures.
@@ -46,8 +47,12 @@ pub(super) struct Tools {
     pub(super) notices: Notices,
     /// Name and driver of the device.
     device: String,
+    /// The stills that this session has saved.
+    stills: Vec<PathBuf>,
     /// Capture to be saved once the window has been drawn.
     due: Option<Wanted>,
+    /// True where the window has been drawn without what is pressed, for a picture of it.
+    pub(super) cleared: bool,
     last: Wanted,
     was_frozen: bool,
 }
@@ -62,14 +67,16 @@ impl Tools {
     ) -> Self {
         Self {
             cine: Cine::new(Limit { frames: FRAMES, bytes: BYTES.min(device.memory_bytes / 16) }),
-            sheet: Sheet::default(),
+            filed: Vec::new(),
             captures: Captures::new(wake),
             // Messages name it in full.
             folder: std::path::absolute(&folder).unwrap_or(folder),
             format: Format::Gif,
             notices: Notices::default(),
             device: format!("{} ({})", device.name, device.driver),
+            stills: Vec::new(),
             due: None,
+            cleared: false,
             last: Wanted::Still,
             was_frozen: false,
         }
@@ -95,11 +102,11 @@ impl Tools {
     }
 
     /// The image to be shown now: live the newest; frozen, the chosen or the playing one.
-    pub(super) fn shown(&mut self, model: &Model, ctx: &egui::Context) -> Option<Frame> {
+    pub(super) fn shown(&mut self, model: &mut Model, ctx: &egui::Context) -> Option<Frame> {
         if model.frozen != self.was_frozen {
             self.was_frozen = model.frozen;
             // Arrow keys move the probe again.
-            self.sheet.deselect();
+            model.sheet.deselect();
         }
         if !model.frozen {
             self.cine.go_live();
@@ -112,15 +119,15 @@ impl Tools {
 
     /// Moves the selected point by pixels of the image, or a quarter where `fine`, along the axis of the
     /// key; returns whether there is one.
-    pub(super) fn nudge(&mut self, axis: Axis, steps: f64, fine: bool) -> bool {
+    pub(super) fn nudge(&self, sheet: &mut Sheet, axis: Axis, steps: f64, fine: bool) -> bool {
         let Some(frame) = self.cine.shown() else {
             return false;
         };
         let step = steps * frame.sector.pitch * if fine { 0.25 } else { 1.0 };
         match axis {
-            Axis::Lateral => self.sheet.nudge(DVec2::X * step),
+            Axis::Lateral => sheet.nudge(DVec2::X * step),
             // Up is the key of this axis, and depth grows downwards.
-            Axis::Elevation => self.sheet.nudge(-DVec2::Y * step),
+            Axis::Elevation => sheet.nudge(-DVec2::Y * step),
             _ => false,
         }
     }
@@ -141,12 +148,30 @@ impl Tools {
     }
 
     /// Returns whether a picture of the window is wanted.
-    pub(super) fn wants_shot(&self) -> bool {
-        self.due == Some(Wanted::Still) && !self.sheet.marks().is_empty()
+    pub(super) fn wants_shot(&self, model: &Model) -> bool {
+        self.due == Some(Wanted::Still) && !model.sheet.marks().is_empty()
     }
 
-    /// Saves the wanted content. `marked` is the picture of the window around the image.
-    pub(super) fn save(&mut self, model: &Model, marked: Option<Screenshot>) {
+    /// The marks that no saved image holds.
+    pub(super) fn unfiled<'m>(&self, model: &'m Model) -> &'m [Mark] {
+        match model.sheet.marks() {
+            marks if marks == self.filed => &[],
+            marks => marks,
+        }
+    }
+
+    /// Returns whether something is still to be saved, or being saved.
+    pub(super) fn is_saving(&self) -> bool {
+        self.due.is_some() || self.captures.running().next().is_some()
+    }
+
+    /// Saves the wanted content. `marked` is the picture of the window around the image, `strip` that of M-mode.
+    pub(super) fn save(
+        &mut self,
+        model: &Model,
+        marked: Option<Screenshot>,
+        strip: impl FnOnce() -> Option<SavedStrip>,
+    ) {
         let Some(wanted) = self.due.take() else {
             return;
         };
@@ -158,12 +183,13 @@ impl Tools {
             Wanted::Still => {
                 let mut sidecar = self.about(model, &frame);
                 sidecar.extend(settings(model, &frame, Some(&frame.pose)));
-                sidecar.extend(sidecar::marks(self.sheet.marks(), &frame.moment()));
-                let still = Still { frame, sidecar, marked };
+                sidecar.extend(sidecar::marks(model.sheet.marks(), &frame.moment()));
+                self.filed = model.sheet.marks().to_vec();
+                let still = Still { frame, sidecar, marked, strip: strip() };
                 self.captures.still(folder, stem, still);
             }
             Wanted::Clip => {
-                let clip = self.marked_loop(model, &frame);
+                let clip = Clip { strip: strip(), ..self.marked_loop(model, &frame) };
                 self.captures.clip(folder, stem, clip);
             }
         }
@@ -179,7 +205,7 @@ impl Tools {
             times.push(json!({
                 "time_s": frame.seconds,
                 "shown_until_s": end,
-                "pose": sidecar::pose(&frame.pose),
+                "pose": facts::pose(&frame.pose),
                 "quality": frame.grade.json(),
             }));
             let same = |last: &Frame| {
@@ -202,7 +228,7 @@ impl Tools {
         sidecar.insert("speed".into(), self.cine.speed().into());
         sidecar.insert("frames".into(), times.into());
         sidecar.insert("settings".into(), all_settings.into());
-        Clip { frames, sidecar, format: self.format }
+        Clip { frames, sidecar, format: self.format, strip: None }
     }
 
     /// The text common to pictures and clips.
@@ -218,9 +244,9 @@ impl Tools {
             "scene": model.title,
             "scene_file": model.file.path.display().to_string(),
             "device": self.device,
-            "image": sidecar::image(&area),
+            "image": facts::image(&area),
             "time_s": frame.seconds,
-            "pose": sidecar::pose(&frame.pose),
+            "pose": facts::pose(&frame.pose),
             "quality": frame.grade.json(),
         });
         match said {
@@ -233,11 +259,35 @@ impl Tools {
     pub(super) fn collect(&mut self) {
         for outcome in self.captures.finished() {
             match outcome {
-                Ok(Some(file)) => self.notices.saved(format!("Saved {}", file.display())),
-                Ok(None) => self.notices.saved("Cancelled; nothing was saved".into()),
-                Err(error) => self.notices.failed(error.to_string()),
+                Ok(Some(file)) => {
+                    self.notices.tell(format!("Saved {}", file.display()));
+                    if file.extension().is_some_and(|end| end == "png") {
+                        self.stills.push(file);
+                    }
+                }
+                Ok(None) => self.notices.tell("Cancelled; nothing was saved".into()),
+                Err(error) => {
+                    self.filed.clear();
+                    self.notices.failed(error.to_string());
+                }
             }
         }
+    }
+
+    /// The stills of this session that are still there, with their marks where they have any.
+    pub(super) fn stills(&self) -> impl Iterator<Item = PathBuf> {
+        let marked = |file: &PathBuf| {
+            let name = file.file_stem().unwrap_or_default().to_string_lossy();
+            let marked = file.with_file_name(format!("{name}-marked.png"));
+            if marked.exists() { marked } else { file.clone() }
+        };
+        self.stills.iter().map(marked).filter(|file| file.exists())
+    }
+
+    /// Saves a report with the stills of this session.
+    pub(super) fn report(&mut self, title: &str, report: Report) {
+        let stem = format!("{}-report", sidecar::stem(title));
+        self.captures.report((self.folder.clone(), stem), report, self.stills().collect());
     }
 
     /// Drops everything that a device holds.

@@ -8,6 +8,8 @@ use std::time::{Duration, Instant};
 use egui::{Align2, FontId, PointerButton, Rect, Response, Sense, Stroke, Ui, pos2, vec2};
 use glam::{DVec2, DVec3};
 
+pub(super) use fan::outline;
+
 use super::hold;
 use super::look::{Look, Pictured};
 use super::model::{Camera, Model, Ray};
@@ -42,6 +44,8 @@ pub(super) struct State {
     revision: u64,
     /// Estimated time of a pixel on the device, ms.
     pixel_ms: f64,
+    /// Where a right click asks what is seen there, and its ray.
+    pub(super) asked: Option<(egui::Pos2, Ray)>,
     /// The probe in the pointer's hand.
     hold: hold::State,
 }
@@ -55,6 +59,7 @@ impl Default for State {
             budget_ms: SWIFT,
             revision: 0,
             pixel_ms: 0.0,
+            asked: None,
             hold: hold::State::default(),
         }
     }
@@ -170,6 +175,11 @@ pub(super) fn show(
     let place = Place { rect: ui.max_rect() };
     let id = ui.id().with("view3d");
     let response = ui.interact(place.rect, id, Sense::click_and_drag());
+    if response.secondary_clicked()
+        && let Some(at) = response.interact_pointer_pos()
+    {
+        state.asked = Some((at, place.ray(&model.view3d.camera, at)));
+    }
     let before = model.view3d.camera;
     if !hold::show(ui, &response, &place, model, &mut state.hold) {
         navigate(ui, &response, &place, &mut model.view3d.camera);

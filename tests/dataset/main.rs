@@ -1,5 +1,5 @@
 //! Data sets: the same bytes whole, in shards and resumed; what a mistake in a plan says; read by the libraries that they
-//! are made for.
+//! are made for, as are renders.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -8,6 +8,7 @@ use std::sync::OnceLock;
 mod made;
 mod plans;
 mod readers;
+mod renders;
 mod stopped;
 
 #[path = "../common/program.rs"]

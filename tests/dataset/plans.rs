@@ -195,11 +195,14 @@ fn anatomies_are_apportioned_whole_and_by_the_seed() {
 }
 
 #[test]
-fn the_shipped_plan_and_the_one_in_the_manual_load() {
+fn the_shipped_plans_and_the_one_in_the_manual_load() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let (plan, _) = Plan::load(&root.join("datasets/example.toml")).expect("sound");
     assert_eq!((plan.samples(), plan.splits.len()), (32, 2));
     plan.check(0..plan.samples()).expect("every sample is sound");
+    let (plan, _) = Plan::load(&root.join("datasets/tissues.toml")).expect("sound");
+    assert_eq!((plan.samples(), plan.arrays.len()), (2000, 0));
+    plan.check((0..plan.samples()).step_by(20)).expect("every sample is sound");
     let page = std::fs::read_to_string(root.join("docs/datasets.md")).expect("the page");
     let example =
         page.split("```toml\n").nth(1).and_then(|e| e.split("```").next()).expect("a plan");

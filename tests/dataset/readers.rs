@@ -7,17 +7,17 @@ use crate::skip::{Lacking, skip};
 use crate::{Desk, SAMPLES, SCENE, desk, files};
 
 #[path = "../common/python.rs"]
-mod python;
+pub mod python;
 
 /// A Python with webdataset and pyuff_ustb; none where they cannot be had.
-fn readers() -> Option<PathBuf> {
+pub fn readers() -> Option<PathBuf> {
     static MADE: OnceLock<Option<PathBuf>> = OnceLock::new();
     let packages = ["webdataset==1.0.2", "pyuff_ustb==3.0.0", "h5py==3.16.0", "pillow==13.0.0"];
     found(&MADE, "readers", "import PIL, pyuff_ustb, webdataset", &packages)
 }
 
 /// A Python with zea, which needs jax to be imported at all.
-fn zea() -> Option<PathBuf> {
+pub fn zea() -> Option<PathBuf> {
     static MADE: OnceLock<Option<PathBuf>> = OnceLock::new();
     found(&MADE, "zea", "import jax, zea.data.spec, PIL", &["zea==0.1.8", "jax[cpu]"])
 }
@@ -111,6 +111,10 @@ for path in sorted(glob.glob(sys.argv[1] + "/zea/*/*.hdf5")):
         "pose": float(np.abs(pose.translation[0] * 1000 - facts["position_mm"]).max()),
         "turn": float(np.abs(pose.rotation[0] - facts["rotation_wxyz"]).max()), "kind": pose.rotation_representation,
         "envelope": bool((data.envelope_data.values[0] == np.load(name + ".envelope.npy").T).all()),
+        "rf": bool((data.rf.values[0] == np.load(name + ".rf.npy").T).all()),
+        "loss": bool(np.array_equal(data.loss.values[0], np.load(name + ".loss.npy"), equal_nan=True)),
+        "position": bool(np.array_equal(data.position.values[0], np.load(name + ".position.npy"), equal_nan=True)),
+        "instance": bool((data.instance.values[0] == np.load(name + ".instance.npy")).all()),
         "iq": bool((data.beamformed_data.values[0] == iq.transpose(1, 0, 2)).all()),
         "deepest": float(data.beamformed_data.coordinates[-1, 0, 2]) * 1000, "subject": str(spec.metadata.subject.id),
     })
@@ -125,7 +129,17 @@ fn zea_opens_and_validates_every_file() {
     let read = read.as_array().expect("files");
     assert_eq!(read.len(), 3, "{said}");
     for file in read {
-        for key in ["image", "segmentation", "named", "envelope", "iq"] {
+        for key in [
+            "image",
+            "segmentation",
+            "named",
+            "envelope",
+            "iq",
+            "rf",
+            "loss",
+            "position",
+            "instance",
+        ] {
             assert!(file[key] == true, "{key}: {file}");
         }
         assert_eq!(
@@ -164,6 +178,7 @@ for path in sorted(glob.glob(sys.argv[1] + "/uff/*/*.uff")):
         "axes": float(max(np.abs(x - across).max(), np.abs(z - along).max())),
         "frequency": float(read.modulation_frequency) - facts["lines"]["frequency_mhz"] * 1e6,
         "pitch": float(np.hypot(x[0, 1] - x[0, 0], z[0, 1] - z[0, 0])) - facts["lines"]["sample_mm"],
+        "rf": bool((pyuff_ustb.Uff(path)["beamformed_rf"].data.ravel() == np.load(name + ".rf.npy").ravel()).all()),
         "sampling": float(read.sampling_frequency) * 2e-6 * facts["lines"]["sample_mm"], "info": read.info[:8],
     })
 json.dump(out, sys.stdout)
@@ -178,7 +193,7 @@ fn pyuff_reads_the_baseband_back() {
     let kinds: Vec<_> = read.iter().map(|file| file["kind"].as_str().expect("a class")).collect();
     assert_eq!(kinds, ["LinearScan", "SectorScan", "SectorScan"]);
     for file in read {
-        assert!(file["same"] == true, "{file}");
+        assert!(file["same"] == true && file["rf"] == true, "{file}");
         assert_eq!(
             (&file["channels"], &file["frames"], &file["info"]),
             (&1.into(), &1.into(), &"insonify".into())
@@ -208,7 +223,7 @@ fn exchanged() -> &'static Desk {
             scene("phased", "probe.kind = \"phased\"\nprobe.field_of_view = \"60 deg\""),
         ];
         let text = format!(
-            "formats = [\"uff\", \"zea\", \"folder\"]\narrays = [\"iq\", \"envelope\", \"loss\", \"position\"]\n{}",
+            "formats = [\"uff\", \"zea\", \"folder\"]\narrays = [\"iq\", \"rf\", \"envelope\", \"loss\", \"position\", \"instance\"]\n{}",
             scenes.concat()
         );
         desk.write("plan.toml", &text);

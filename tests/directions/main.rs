@@ -96,6 +96,39 @@ fn standard_error_is_written_by_one_module() {
     }
 }
 
+/// What Windows or macOS has not, as it stands in sources.
+const OF_ONE_SYSTEM: [&str; 6] = ["os::unix", "os::linux", "os::fd", "libc::", "\"/proc", "\"/dev"];
+
+/// Lines of a source, without the tests at its end, that need one system.
+fn bound_to_one_system(source: &str) -> Vec<&str> {
+    let code = source.split("#[cfg(test)]").next().expect("a part");
+    code.lines().filter(|line| OF_ONE_SYSTEM.iter().any(|word| line.contains(word))).collect()
+}
+
+/// Windows and macOS are not ruled out: docs/install.md says what they need.
+#[test]
+fn one_module_alone_needs_a_certain_system() {
+    let mut todo: Vec<_> =
+        ["src", "python/src", "build.rs"].map(|folder| root().join(folder)).into();
+    while let Some(path) = todo.pop() {
+        if path.is_dir() {
+            let entries = fs::read_dir(&path).expect("a folder");
+            todo.extend(entries.map(|entry| entry.expect("an entry").path()));
+        } else if path.extension().is_some_and(|e| e == "rs") && !path.ends_with("tests.rs") {
+            let text = fs::read_to_string(&path).expect("a source");
+            let found = bound_to_one_system(&text);
+            let allowed = path.ends_with("gpu/process.rs");
+            assert_eq!(!found.is_empty(), allowed, "{}: {found:?}", path.display());
+        }
+    }
+    for planted in
+        ["use std::os::unix::fs::PermissionsExt;", "libc::getpid()", "read(\"/proc/self/maps\")"]
+    {
+        assert_eq!(bound_to_one_system(planted), [planted]);
+    }
+    assert!(bound_to_one_system("a // b\n#[cfg(test)]\nuse std::os::unix::fs;").is_empty());
+}
+
 #[test]
 fn a_planted_use_is_found_however_it_is_written() {
     let table = vec![("low".to_owned(), vec!["ground".to_owned(), "high::floor".to_owned()])];

@@ -72,3 +72,37 @@ fn the_examples_of_the_reference_load() {
     let wrong = real.replace("paths = 16", "pathz = 16");
     assert_eq!(of_examples(&wrong).len(), 1);
 }
+
+/// Files that the commands of a document write, and that would be left in the repository.
+fn left_behind(document: &str) -> Vec<String> {
+    let shells =
+        document.split("```sh\n").skip(1).map(|s| s.split("```").next().unwrap_or_default());
+    let mut left = Vec::new();
+    for command in shells.flat_map(str::lines) {
+        let command = command.split(" #").next().unwrap_or_default();
+        let words: Vec<_> = command.split_whitespace().collect();
+        let written = words.windows(2).filter(|pair| {
+            ["-o", "--output", "--json", "--dump", "--labels", "--volume", "--captures"]
+                .contains(&pair[0])
+        });
+        let outside = written.map(|pair| pair[1]).filter(|path| !path.starts_with("out/"));
+        left.extend(outside.map(str::to_owned));
+        let is_render = command.contains("insonify render");
+        if is_render && !words.contains(&"-o") {
+            left.push(format!("{command} names no file"));
+        }
+    }
+    left
+}
+
+#[test]
+fn the_readme_s_commands_leave_nothing_in_the_repository() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let read = |name: &str| std::fs::read_to_string(root.join(name)).expect(name);
+    let readme = read("README.md");
+    assert!(readme.matches(" out/").count() >= 5, "they write there");
+    assert_eq!(left_behind(&readme), Vec::<String>::new());
+    assert!(read(".gitignore").lines().any(|line| line == "/out"));
+    let planted = "```sh\ninsonify render a -o b.png\ninsonify render a # -o out/b.png\n```\n";
+    assert_eq!(left_behind(planted).len(), 2);
+}

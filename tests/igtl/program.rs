@@ -5,8 +5,9 @@ use std::net::SocketAddr;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
+use insonify::igtl::command;
 use insonify::igtl::image::Image;
-use insonify::igtl::message::Content;
+use insonify::igtl::message::{Content, Message};
 
 use crate::client::{Client, shift};
 
@@ -115,6 +116,68 @@ fn a_client_moves_the_probe_and_sees_what_it_sees() {
         more += read;
         assert!(read > 0 && more < 1 << 22, "{more} bytes");
     }
+}
+
+/// The reply to a command.
+fn order(client: &mut Client, id: u32, name: &str, words: &str) -> String {
+    client.send(&command::command(id, name, words));
+    match client.receive_kind("RTS_COMMAND").content {
+        Content::Command { reply: true, id: answered, name: own, text, .. } => {
+            assert_eq!((answered, own.is(name)), (id, true));
+            String::from_utf8(text).expect("UTF-8")
+        }
+        other => panic!("{other:?}"),
+    }
+}
+
+fn next_image(client: &mut Client) -> Image {
+    match client.receive_kind("IMAGE").content {
+        Content::Image(image) => *image,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn commands_set_any_key_time_and_scene_and_are_answered() {
+    let program = Program::start("scenes/phantom.toml", &[]);
+    let mut client = Client::at(program.address);
+    let first = next_image(&mut client);
+    assert_eq!(order(&mut client, 1, "get", "probe.depth"), "probe.depth = \"160 mm\"");
+    assert_eq!(order(&mut client, 2, "probe.depth", "80 mm"), "probe.depth = 80 mm");
+    assert_eq!(order(&mut client, 3, "get probe.depth", ""), "probe.depth = \"80 mm\"");
+    // Half the depth: pixels half as large.
+    let height = |image: &Image| {
+        image.patient_from_pixel().matrix3.col(1).length() * f64::from(image.size[1])
+    };
+    let lower = height(&first) - 80.0;
+    let halved = (0..200).any(|_| (height(&next_image(&mut client)) - lower).abs() < 2.0);
+    assert!(halved, "{} mm before", height(&first));
+    // Wrong ones are answered with cause and remedy, and change nothing.
+    for (name, text, cause) in [
+        ("probe.dept", "80 mm", "did you mean `depth`?"),
+        ("probe.depth", "5 MHz", "error: "),
+        ("imaging.gain", "900", "must lie between"),
+        ("scene", "nowhere", "scenes that ship: abdomen"),
+        ("louder", "", "is no command"),
+        ("time", "4 mm", "error: "),
+    ] {
+        let said = order(&mut client, 4, name, text);
+        assert!(said.starts_with("error: ") && said.contains(cause), "{name} {text}: {said}");
+    }
+    assert_eq!(order(&mut client, 5, "get", "probe.depth"), "probe.depth = \"80 mm\"");
+    // A key of the anatomy, in a STRING.
+    let text = b"mesh.\"contrast -9 dB at 65 mm\".priority = 9".to_vec();
+    client.send(&Message::new("me", Content::String { encoding: 3, text }));
+    let answer = client.receive_kind("STRING");
+    let Content::String { text, .. } = answer.content else { panic!("no text") };
+    let said = String::from_utf8(text).expect("UTF-8");
+    assert!(answer.device.is("me") && said.contains("mesh"), "{said}");
+    assert_eq!(order(&mut client, 6, "freeze", ""), "frozen");
+    assert_eq!(order(&mut client, 7, "time", "400 ms"), "time = 0.4 s");
+    assert_eq!(order(&mut client, 8, "unfreeze", ""), "running");
+    let said = order(&mut client, 9, "scene", "heart");
+    assert_eq!(said, "Beating heart, apical four-chamber view");
+    next_image(&mut client);
 }
 
 #[test]

@@ -72,7 +72,8 @@ fn an_image_of_indices_shows_the_tissues() {
 #[test]
 fn a_mistake_is_told_before_anything_is_made() {
     let dir = tempfile::tempdir().expect("a folder");
-    for (name, what) in [("out.csv", ".npz"), ("nowhere/out.npz", "folder")] {
+    std::fs::write(dir.path().join("file"), "").expect("written");
+    for (name, what) in [("out.csv", ".npz"), ("file/out.npz", "folder cannot be made")] {
         let (well, said) = render(dir.path(), &["--labels", name]);
         assert!(!well && said.contains(what), "{said}");
         assert!(!dir.path().join("a.png").exists(), "{name}");

@@ -2,6 +2,7 @@
 
 mod files;
 mod geometry;
+mod levels;
 mod motion;
 mod painted;
 mod power;

@@ -238,10 +238,11 @@ fn both_formats_of_a_sweep_make_the_same_volume() {
 #[test]
 fn what_cannot_be_written_is_said_before_the_work() {
     let (folder, scene) = folder();
+    std::fs::write(folder.path().join("file"), "").expect("written");
     for (more, cause) in [
-        (&["-o", "none/a.seq.mha"][..], "its folder does not exist"),
-        (&["-o", "none/a.seq.nrrd"], "its folder does not exist"),
-        (&["-o", "none/a.dcm"], "its folder does not exist"),
+        (&["-o", "file/a.seq.mha"][..], "folder cannot be made"),
+        (&["-o", "file/a.seq.nrrd"], "folder cannot be made"),
+        (&["-o", "file/a.dcm"], "folder cannot be made"),
         (&["-o", "a.seq.mhd"], "frames with poses are in one file"),
         (&["-o", "a.seq.mha", "--frames", "100000"], "are more than 2 GiB"),
     ] {

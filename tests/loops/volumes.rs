@@ -254,7 +254,7 @@ fn what_cannot_be_written_is_said_before_the_work() {
         (&["-o", "a.dcm"][..], "write a volume by --volume NAME.dcm"),
         (&["-o", "a.png"], "tracked frames are MetaImage or NRRD"),
         (&["--volume", "a.nrrd"], "a volume is MetaImage in one file or DICOM"),
-        (&["--volume", "none/a.dcm"], "its folder does not exist"),
+        (&["--volume", "scene.toml/a.dcm"], "folder cannot be made"),
         (
             &["--volume", "a.dcm", "--volumes", "3", "--period", "1s"],
             "volumes over time are MetaImage",

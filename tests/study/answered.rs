@@ -109,7 +109,7 @@ fn mistakes_are_explained_and_nothing_is_written() {
         (&["key.csv", "-k", "key.csv"], &["not a file of answers"]),
         (&["none.json", "-k", "key.csv"], &["none.json", "cannot be read"]),
         (&["a.json", "-k", "key.csv", "-o", "t.xls"], &["`xls`", "NAME.csv or NAME.md"]),
-        (&["a.json", "-k", "key.csv", "-o", "no/t.md"], &["no/t.md"]),
+        (&["a.json", "-k", "key.csv", "-o", "key.csv/t.md"], &["key.csv/t.md"]),
         (&["-k", "key.csv"], &["<ANSWERS>"]),
     ] {
         let (went_well, said) = evaluate(folder.path(), args);

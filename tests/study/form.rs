@@ -18,7 +18,14 @@ fn downloaded(browser: &Browser, to: &Path) -> PathBuf {
         let all = std::fs::read_dir(browser.saved()).expect("a folder").flatten();
         let whole: Vec<PathBuf> =
             all.map(|e| e.path()).filter(|p| p.extension().is_some_and(|e| e == "json")).collect();
-        if let [file] = whole.as_slice() {
+        // Browsers make the file first and write it later.
+        let written = |file: &PathBuf| {
+            let text = std::fs::read(file).expect("a file");
+            serde_json::from_slice::<Value>(&text).is_ok()
+        };
+        if let [file] = whole.as_slice()
+            && written(file)
+        {
             std::fs::rename(file, to).expect("moved");
             return to.to_owned();
         }

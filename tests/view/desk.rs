@@ -3,6 +3,7 @@
 use std::io::{BufRead, BufReader, IoSlice};
 use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use x11rb::connection::{Connection, RequestConnection as _};
@@ -123,7 +124,10 @@ pub struct Desk {
     root: xproto::Window,
     window: xproto::Window,
     _display: Display,
-    folder: tempfile::TempDir,
+    folder: Arc<tempfile::TempDir>,
+    /// The system's folder for the state of programs.
+    state: tempfile::TempDir,
+    command: Command,
 }
 
 impl Desk {
@@ -148,15 +152,18 @@ impl Desk {
         arguments: &[&str],
         prepare: impl FnOnce(&Path, &mut Command),
     ) -> Option<Self> {
-        let folder = tempfile::tempdir().expect("a folder");
+        let folder = Arc::new(tempfile::tempdir().expect("a folder"));
+        let state = tempfile::tempdir().expect("a folder");
         let file = folder.path().join("scene.toml");
         std::fs::write(&file, scene).expect("written");
         let (x, screen) = x11rb::connect(Some(&display.name)).expect("the X server answers");
         let root = x.setup().roots[screen].root;
         let mut command = display.program(&file, arguments);
+        command.env("XDG_STATE_HOME", state.path());
         prepare(folder.path(), &mut command);
         let program = command.spawn().expect("started");
-        let mut desk = Self { program, x, root, window: 0, _display: display, folder };
+        let mut desk =
+            Self { program, x, root, window: 0, _display: display, folder, state, command };
         desk.wait_for("a window", Desk::find);
         desk.focus();
         Some(desk)
@@ -247,6 +254,18 @@ impl Desk {
         })
     }
 
+    /// Waits for three seconds in which the program uses no more than `most` of the processor. What it still does
+    /// on a slow machine ends some time; what it does for ever is never over.
+    pub fn idles(&mut self, most: Duration) {
+        let (mut begun, mut before) = (Instant::now(), self.processor_time());
+        self.wait_for("the program to do nothing", |desk| {
+            if desk.processor_time() - before > most {
+                (begun, before) = (Instant::now(), desk.processor_time());
+            }
+            begun.elapsed() > Duration::from_secs(3)
+        });
+    }
+
     /// Waits until a condition holds.
     pub fn wait_for(&mut self, what: &str, mut is_so: impl FnMut(&mut Self) -> bool) {
         let began = Instant::now();
@@ -307,6 +326,11 @@ impl Desk {
         std::fs::read_to_string(self.folder.path().join("scene.toml")).expect("a scene")
     }
 
+    /// The folder of the scene file, which stays as long as this is kept.
+    pub fn keep(&self) -> Arc<tempfile::TempDir> {
+        self.folder.clone()
+    }
+
     /// The folder of the scene file.
     pub fn folder(&self) -> &Path {
         self.folder.path()
@@ -336,6 +360,21 @@ impl Desk {
     /// Clicks at a place of the display.
     pub fn click(&self, at: (u16, u16)) {
         self.drag(at, at);
+    }
+
+    /// Turns the wheel by a notch, away from the hand: nearer.
+    pub fn wheel(&self, (x, y): (u16, u16)) {
+        self.fake(xproto::MOTION_NOTIFY_EVENT, 0, (x as i16, y as i16));
+        self.fake(xproto::BUTTON_PRESS_EVENT, 4, (0, 0));
+        self.fake(xproto::BUTTON_RELEASE_EVENT, 4, (0, 0));
+    }
+
+    /// Clicks with the right button.
+    pub fn click_right(&self, (x, y): (u16, u16)) {
+        self.fake(xproto::MOTION_NOTIFY_EVENT, 0, (x as i16, y as i16));
+        std::thread::sleep(Duration::from_millis(100));
+        self.fake(xproto::BUTTON_PRESS_EVENT, 3, (0, 0));
+        self.fake(xproto::BUTTON_RELEASE_EVENT, 3, (0, 0));
     }
 
     /// Presses the button at one place of the display and releases it at another.
@@ -418,11 +457,51 @@ impl Desk {
         1024 * value.expect("a size")
     }
 
-    /// Presses Ctrl+Q; asserts that the program ends by itself, without an error.
-    pub fn quit(self) {
+    /// Presses Ctrl+Q, and discards what is not saved; asserts that the program ends by itself, without an error.
+    pub fn quit(mut self) {
         self.hold_control(Key::Letter('q'));
+        let began = Instant::now();
+        while self.program.try_wait().expect("a child").is_none() {
+            assert!(began.elapsed() < PATIENCE, "the program does not end");
+            // Once the question is there; before, the key has no meaning.
+            std::thread::sleep(Duration::from_millis(200));
+            self.hold_control(Key::Letter('d'));
+        }
         let status = self.ended();
         assert!(status.success(), "{status}");
+    }
+
+    /// Closes the window by the button of a window manager.
+    pub fn close(&self) {
+        let atom =
+            |name: &str| self.x.intern_atom(false, name.as_bytes()).unwrap().reply().unwrap().atom;
+        let data = [atom("WM_DELETE_WINDOW"), x11rb::CURRENT_TIME, 0, 0, 0];
+        let protocols = atom("WM_PROTOCOLS");
+        let message = xproto::ClientMessageEvent::new(32, self.window, protocols, data);
+        self.x.send_event(false, self.window, xproto::EventMask::NO_EVENT, message).unwrap();
+        self.x.flush().unwrap();
+    }
+
+    /// Types a text of small letters, digits and signs into a field in the place of what it holds.
+    pub fn retype(&self, text: &str) {
+        self.hold_control(Key::Letter('a'));
+        text.chars().for_each(|letter| self.press(Key::Letter(letter)));
+    }
+
+    /// Kills the program, as a crash does, and starts it again as it was started.
+    pub fn crash(&mut self) {
+        self.program.kill().expect("it runs");
+        self.program.wait().expect("a child");
+        self.program = self.command.spawn().expect("started");
+        self.wait_for("a window", Desk::find);
+        self.focus();
+    }
+
+    /// Texts of what the program keeps of unsaved work.
+    pub fn kept(&self) -> Vec<String> {
+        let all = std::fs::read_dir(self.state.path().join("insonify/unsaved"));
+        let files = all.into_iter().flatten().flatten().map(|e| e.path().join("session.json"));
+        files.filter_map(|file| std::fs::read_to_string(file).ok()).collect()
     }
 }
 

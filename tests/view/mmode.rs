@@ -6,9 +6,10 @@ use insonify::scene::Scene;
 use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer};
 use insonify::view::engine::{Pixels, Sector};
-use insonify::view::model::mmode::{ROWS, Strip};
+use insonify::view::model::mmode::{Aim, ROWS, Strip};
 
 use super::desk::{Desk, Key};
+use super::tools::sidecar;
 use super::{brightness, difference};
 
 /// A ball of bone that goes 6 mm up and down every second below a linear probe.
@@ -53,7 +54,7 @@ fn a_moving_wall_is_drawn_where_it_is() {
     let library = Library::embedded();
     let made = Simulator::new(&device, &library, &scene, Tracer::Bvh);
     let mut simulator = made.expect("a simulator");
-    let mut strip = Strip::new(16);
+    let mut strip = Strip::new(Aim::Scanline(16));
     for i in 0..20 {
         let seconds = f64::from(i) * 0.05;
         scene.set_time(seconds);
@@ -66,7 +67,7 @@ fn a_moving_wall_is_drawn_where_it_is() {
             pitch: f64::from(constants.pixel_pitch),
         };
         let size = [width, height];
-        strip.add(seconds, &scene.probe, sector, &Pixels { size, rgba });
+        strip.add_image(seconds, &scene.probe, sector, &Pixels { size, rgba });
     }
     let raster = strip.raster(0.95, 0.95, 190);
     let brightest = |x: usize| {
@@ -91,8 +92,11 @@ fn a_moving_wall_is_drawn_where_it_is() {
 }
 
 #[test]
-fn the_strip_opens_runs_and_stands() {
-    let Some(mut desk) = Desk::open(SCENE, &["--validate"]) else {
+fn the_strip_opens_runs_stands_is_measured_and_saved() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let captures = folder.path().join("captures");
+    let arguments = ["--validate", "--captures", captures.to_str().expect("UTF-8")];
+    let Some(mut desk) = Desk::open(SCENE, &arguments) else {
         return;
     };
     let image = [200, 100, 500, 300];
@@ -108,7 +112,42 @@ fn the_strip_opens_runs_and_stands() {
     let frozen = desk.grab(strip);
     std::thread::sleep(Duration::from_millis(700));
     assert!(difference(&desk.grab(strip), &frozen) < 0.1, "frozen");
+
+    // Two measurements stay, and are saved with the strip.
+    for (from, to) in [((400, 560), (460, 600)), ((520, 560), (600, 560))] {
+        let last = desk.grab(strip);
+        desk.drag(from, to);
+        desk.wait_for("a measurement", |d| difference(&d.grab(strip), &last) > 0.02);
+    }
+    desk.press(Key::F2);
+    let still = sidecar(&mut desk, &captures, "ball-0001.json");
+    let said = &still["mmode"];
+    assert_eq!(said["line"]["scanline"], 16);
+    let measured = said["measurements"].as_array().expect("a list");
+    let letters: Vec<_> = measured.iter().map(|m| m["letter"].as_str()).collect();
+    assert_eq!(letters, [Some("A"), Some("B")]);
+    assert!(measured[0]["mm"].as_f64() > Some(1.0) && measured[1]["mm"].as_f64() < Some(0.5));
+    assert!(measured[1]["seconds"].as_f64() > Some(0.05));
+    let file = captures.join(said["file"].as_str().expect("a name"));
+    let picture = image::open(file).expect("a picture").to_luma8();
+    assert_eq!(picture.height() as usize, ROWS);
+    let walls = walls(&picture);
+    let (low, high) = walls.iter().fold((f64::MAX, 0.0f64), |(l, h), w| (l.min(*w), h.max(*w)));
+    assert!(low > 21.0 && high < 35.0 && high - low > 4.0, "{low} to {high} mm");
+
     desk.press(Key::Letter('m'));
     desk.wait_for("the strip to go", |d| difference(&d.grab(strip), &frozen) > 3.0);
     desk.quit();
+}
+
+/// For each column that shows something, the depth of its brightest place, mm.
+fn walls(picture: &image::GrayImage) -> Vec<f64> {
+    let rows = picture.height();
+    let wall = |x: u32| {
+        let level = |y: u32| picture.get_pixel(x, y).0[0];
+        let brightest = (0..rows).max_by_key(|y| (level(*y), rows - y)).expect("rows");
+        let mm = (f64::from(brightest) + 0.5) / f64::from(rows) * 60.0;
+        (level(brightest) > 100).then_some(mm)
+    };
+    (0..picture.width()).filter_map(wall).collect()
 }

@@ -144,6 +144,7 @@ fn each_section_sets_what_is_saved_and_undo_takes_it_back() {
     let names = [
         "Probe",
         "Image",
+        "Poses",
         "Animation",
         "Probe input",
         "Simulation",
@@ -293,12 +294,8 @@ fn with_all_panels_open_a_window_in_which_nothing_happens_costs_nothing() {
     desk.press(Key::Help);
     let all = [0, 0, 1280, 720];
     desk.settle(all);
-    std::thread::sleep(Duration::from_secs(2));
-    let before = desk.processor_time();
-    std::thread::sleep(Duration::from_secs(3));
-    let used = desk.processor_time() - before;
     // One frame of the interface alone takes ten milliseconds and more; a clock tick is ten.
-    assert!(used <= Duration::from_millis(20), "{used:?} of processor time in 3 s");
+    desk.idles(Duration::from_millis(20));
     desk.quit();
 }
 
@@ -309,10 +306,10 @@ fn animation_stands_and_goes_by_the_pointer() {
     };
     close_all(&mut desk);
     let rows = sections(&desk);
-    desk.click((LEFT + 40, rows[2]));
+    desk.click((LEFT + 40, rows[3]));
     std::thread::sleep(Duration::from_millis(400));
     // "Pause" is the first control of the section.
-    let button = (LEFT + 45, rows[2] + 23);
+    let button = (LEFT + 45, rows[3] + 23);
     desk.click(button);
     let still = desk.settle(IMAGE);
     std::thread::sleep(Duration::from_millis(600));
@@ -334,11 +331,11 @@ fn settings_of_another_file_are_taken_and_another_scene_opens() {
     std::fs::write(desk.folder().join("water.toml"), "name = \"Water\"\n").expect("written");
     // The list of the dialog in the middle of the window, and its buttons.
     let row = |name: &str| {
-        let names = ["preset", "scene", "water", "wrong"];
+        let names = ["..", "preset", "scene", "water", "wrong"];
         let at = names.iter().position(|n| *n == name).unwrap();
         (460, 120 + 21 * at as u16)
     };
-    let (take, open) = ((470, 204), (470, 267));
+    let (take, open) = ((470, 276), (470, 228));
     let warned = |desk: &Desk| {
         let pixels = desk.grab([430, 190, 420, 60]);
         let orange = |p: &&[u8]| p[0] > 150 && p[1] > 100 && p[2] < 100;

@@ -140,12 +140,9 @@ fn listening_costs_nothing_while_nothing_comes() {
     };
     let client = Client::at(address);
     desk.settle([0, 0, 1280, 720]);
-    let before = desk.processor_time();
-    std::thread::sleep(Duration::from_secs(3));
-    let used = desk.processor_time() - before;
     // A frame of the interface alone takes ten milliseconds and more. The listener looks for clients
     // a hundred times a second.
-    assert!(used <= Duration::from_millis(50), "{used:?} of processor time in 3 s");
+    desk.idles(Duration::from_millis(50));
     drop(client);
     desk.quit();
 }

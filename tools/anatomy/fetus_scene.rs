@@ -193,6 +193,7 @@ gel = "5 mm"
 
 # Fluid attenuates less than the tissue that the curve assumes: the far sliders go down.
 [imaging]
+exam = "obstetric"
 tgc_sliders = [0, 0, 0, -2, -4, -7, -10, -12]
 "#;
 

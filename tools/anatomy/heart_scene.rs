@@ -110,7 +110,7 @@ fn report(volumes: &[Vec<f64>]) {
 fn scene(parts: &[Part], count: usize, command: &str, triangles: usize) -> String {
     let mut out = format!(
         "# A beating heart, {triangles} triangles at a time, made by\n#   {command}\n{HEAD}\n\
-         [[selector]]\nname = \"beat\"\nperiod = \"{PERIOD} s\"\n\n\
+         [[selector]]\nname = \"beat\"\nperiod = \"{PERIOD} s\"\nstrategy = \"interpolate\" # smooth between the eight phases\n\n\
          # In rising priority: where two overlap, the later one wins.\n"
     );
     let (beating, chest) = parts.split_at(count);
@@ -165,6 +165,7 @@ gel = "5 mm"
 
 # Blood attenuates less than the tissue that the curve assumes: the far sliders go down.
 [imaging]
+exam = "cardiac"
 tgc_sliders = [0, -1, -3, -6, -9, -12, -16, -20]
 
 # Fat, pleura and loose tissue between the heart and the lungs.

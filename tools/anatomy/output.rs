@@ -81,7 +81,9 @@ pub fn scene(parts: &[Part], folder: &str, command: &str, triangles: usize) -> S
          name = \"Upper abdomen\"\n\
          background = \"gel\"\n\n\
          [probe]\n\
-         preset = \"abdominal\"\n\n"
+         preset = \"abdominal\"\n\n\
+         [imaging]\n\
+         exam = \"abdomen\"\n\n"
     );
     let default = pose::default();
     out += &format!("# {}\n[probe.pose]\n", default.title);

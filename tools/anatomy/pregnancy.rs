@@ -58,6 +58,7 @@ slice_thickness = "8 mm"
 
 # Fluid attenuates less than the tissue that the curve assumes: the far sliders go down.
 [imaging]
+exam = "obstetric"
 tgc_sliders = [0, 0, 0, -1, -3, -5, -7, -9]
 {more}
 "#

@@ -97,6 +97,7 @@ elevation_focus = "40 mm"
 slice_thickness = "4 mm"
 
 [imaging]
+exam = "obstetric"
 {}{more}
 "#,
         case.sliders

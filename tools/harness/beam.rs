@@ -26,10 +26,10 @@ pub const SUBJECT: Subject = Subject {
 
 /// Shares of the scanlines, and sums of the elements that are not coupled.
 pub(super) fn contact(frame: &Frame, random: &mut Random) -> Vec<f32> {
-    let mut contact = random.floats(frame.scanlines as usize, 0.0, 1.0);
+    let mut contact = random.floats(frame.face_lines() as usize, 0.0, 1.0);
     let mut air = 0.0;
     contact.push(air);
-    for coupled in random.floats(frame.scanlines as usize, 0.0, 1.0) {
+    for coupled in random.floats(frame.face_lines() as usize, 0.0, 1.0) {
         air += coupled.round();
         contact.push(air);
     }

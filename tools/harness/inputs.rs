@@ -109,6 +109,9 @@ pub fn frame(case: Case, size: Size) -> Frame {
         inverse_range: 1.0 / 60.0,
         frame_index: 5,
         couplant: worlds::couplant(case),
+        // The odd case makes some of the face's scanlines.
+        first_line: if case == Case::Odd { 3 } else { 0 },
+        lines_beside: if case == Case::Odd { 9 } else { 0 },
         image_width: 1,
         image_height: 1,
         pixel_pitch: 0.25,

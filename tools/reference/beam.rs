@@ -21,7 +21,7 @@ pub fn beam(
     for l in 0..frame.scanlines {
         for k in 0..frame.samples {
             let row = &rows[k as usize];
-            let words = pcg4d([l, k, frame.frame_index, frame.seed]);
+            let words = pcg4d([frame.first_line + l, k, frame.frame_index, frame.seed]);
             let weights = weights(row.lateral_lines.into());
             let reach = weights.len() as i64 / 2;
             let coupling = coupling(frame, row, contact, l);
@@ -64,11 +64,12 @@ pub fn saturated(surface: &[i32], volume: &[i32]) -> u32 {
     pairs.filter(|(s, v)| full(s) || full(v)).count() as u32
 }
 
-/// The factor on the echoes of line `l`: coupled share of the transmit aperture times that of the receive
+/// The factor on the echoes of line `l` of the frame: coupled share of the transmit aperture times that of the receive
 /// aperture, element by element.
 pub(super) fn coupling(frame: &Frame, row: &Row, contact: &[f32], l: u32) -> f64 {
-    let (transmit, air) = contact.split_at(frame.scanlines as usize);
-    let count = f64::from(frame.scanlines);
+    let (l, lines) = (frame.first_line + l, frame.face_lines());
+    let (transmit, air) = contact.split_at(lines as usize);
+    let count = f64::from(lines);
     let middle = match frame.kind {
         KIND_PHASED => count / 2.0,
         _ => f64::from(l) + 0.5,

@@ -2,10 +2,15 @@
 
 use super::geometry::probe;
 use insonify::probe::Kind;
-use insonify::sim::layout::Frame;
+use insonify::sim::layout::{FLAG_LINE, Frame};
 
 /// Column and row in the scanlines of each pixel, row by row; none outside the sector.
 pub fn places(frame: &Frame) -> Vec<Option<[f64; 2]>> {
+    if frame.flags & FLAG_LINE != 0 {
+        let row = |j: u32| (f64::from(j) + 0.5) * f64::from(frame.pixel_pitch / frame.sample_pitch);
+        let column = f64::from(frame.image_left);
+        return (0..frame.image_height).map(|j| Some([column, row(j)])).collect();
+    }
     let (pitch, left, top) =
         (f64::from(frame.pixel_pitch), f64::from(frame.image_left), f64::from(frame.image_top));
     let mut out = Vec::new();

@@ -31,7 +31,7 @@ pub fn probe(frame: &Frame) -> Probe {
             KIND_PHASED => Kind::Phased { field_of_view },
             kind => panic!("probe kind {kind}"),
         },
-        scanlines: frame.scanlines,
+        scanlines: frame.face_lines(),
         elevation_layers: frame.layers,
         samples: frame.samples,
         depth: frame.depth.into(),
@@ -42,9 +42,9 @@ pub fn probe(frame: &Frame) -> Probe {
     }
 }
 
-/// Scanline `l` of layer `e` in probe space.
+/// Scanline `l` of those that the frame is made of, in layer `e`, in probe space.
 pub fn line(frame: &Frame, l: u32, e: u32) -> Line {
-    let (origin, direction) = probe(frame).ray(l, e);
+    let (origin, direction) = probe(frame).ray(frame.first_line + l, e);
     Line { origin, direction, lateral: DVec3::new(direction.z, 0.0, -direction.x) }
 }
 

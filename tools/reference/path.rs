@@ -80,7 +80,9 @@ impl Path {
 
     /// Random numbers of the line's interaction just reached, for decisions that neighbouring lines must not share.
     pub(super) fn line_random(&self, frame: &Frame, purpose: u32) -> [u32; 4] {
-        pcg4d([self.line, self.n, self.key(), frame.seed ^ purpose])
+        let (l, layer) = self.scanline(frame.scanlines);
+        let on_face = layer * frame.face_lines() + frame.first_line + l;
+        pcg4d([on_face, self.n, self.key(), frame.seed ^ purpose])
     }
 
     /// Scanline and layer.

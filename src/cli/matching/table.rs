@@ -6,10 +6,8 @@ use insonify::probe::Probe;
 
 /// Prints brightness by depth, spread and size: the acquired volume, the simulation before and after.
 pub fn print(probe: &Probe, made: &Matching) {
-    output::line(format!(
-        "{:<24} {:>9} {:>9} {:>9}",
-        "near the mask's border", "acquired", "before", "after"
-    ));
+    output::line(format!("compared around the mask: {}", made.tissue));
+    output::line(format!("{:<24} {:>9} {:>9} {:>9}", "", "acquired", "before", "after"));
     let places = depths(probe);
     for &i in &made.compared {
         let grey = |s: &Statistics| number(s.levels[i].level.map(|l| 255.0 * l), 1);
@@ -22,8 +20,7 @@ pub fn print(probe: &Probe, made: &Matching) {
     let error = |stage: &Stage| {
         let off = made.level_errors(stage);
         let mean = off.iter().sum::<f64>() / off.len() as f64;
-        let rms = (off.iter().map(|e| e * e).sum::<f64>() / off.len() as f64).sqrt();
-        (format!("{mean:+.1}"), format!("{rms:.1}"))
+        (format!("{mean:+.1}"), format!("{:.1}", made.level_deviation(stage)))
     };
     let (before, after) = (error(&made.before), error(&made.after));
     for (what, before, after) in

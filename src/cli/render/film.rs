@@ -1,20 +1,24 @@
 //! The files that the frames of a render become: an image each, or one file of all.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use glam::DAffine3;
 use miette::{IntoDiagnostic, Result, miette};
+use serde_json::{Map, Value, json};
 
-use super::Moment;
+use super::moments::Moment;
 use crate::cli::common;
 use crate::cli::images::Images;
 use insonify::acquire::Recording;
+use insonify::exchange::{self, Format, Frames};
 use insonify::output;
 use insonify::output::dicom::{self, About, Loop};
+use insonify::output::files;
 use insonify::output::movie::Movie;
+use insonify::output::picture::grey_png;
 use insonify::scene::Scene;
 use insonify::sim::Simulator;
-use insonify::sim::dump;
+use insonify::sim::facts::{self, Area};
 
 /// Name of the transform from the probe to the patient's RAS.
 const POSE: &str = "ProbeToReference";
@@ -28,6 +32,10 @@ pub struct Film {
     /// RAS from the world.
     ras_from_world: DAffine3,
     reel: Reel,
+    /// Text beside the pictures and in them: what was imaged, and how.
+    said: Map<String, Value>,
+    /// What is said of each frame: file, time, pose.
+    frames: Vec<Value>,
 }
 
 enum Reel {
@@ -35,13 +43,14 @@ enum Reel {
     Movie(Movie),
     Dicom(Loop),
     Sequence(Recording),
+    Exchange(Box<Frames>, Format),
 }
 
-/// Refuses a file that could not be written in the end.
+/// Refuses a file that could not be written in the end; makes its folder.
 ///
 /// # Errors
-/// Its folder does not exist; a header with its pixels elsewhere.
-pub fn check(output: &Path) -> Result<()> {
+/// Its folder cannot be made or written to; an extension that says no format, a header with its pixels elsewhere.
+pub fn check(output: &Path, frames: u32) -> Result<()> {
     if ends(output, ["mhd", "nhdr"]) {
         return Err(miette!(
             help = "end the name in .mha or .nrrd",
@@ -49,9 +58,19 @@ pub fn check(output: &Path) -> Result<()> {
             output.display()
         ));
     }
-    match dicom::is_meant(output) || is_sequence(output) {
-        true => common::in_folder(output),
-        false => Ok(()),
+    let is_picture = ends(output, ["png", ""]);
+    let is_known = is_picture || Movie::is_meant(output) || dicom::is_meant(output);
+    if !is_known && !is_sequence(output) && Format::of(output).is_none() {
+        return Err(miette!(
+            help = "end the name in .png (pictures), .gif (an animation), .dcm (a loop in DICOM), .seq.mha or .seq.nrrd, \
+                    .uff or .hdf5 (data)",
+            "{} is not written: its ending is that of no format that is known here",
+            output.display()
+        ));
+    }
+    match is_picture {
+        true => common::writable(&Images::new(output, frames).path(0)),
+        false => common::writable(output),
     }
 }
 
@@ -76,6 +95,7 @@ impl Film {
         scene: &Scene,
         moments: &[Moment],
         shown: f64,
+        said: Map<String, Value>,
     ) -> Result<Self> {
         let reel = if Movie::is_meant(output) {
             Reel::Movie(Movie::new(output).into_diagnostic()?)
@@ -86,6 +106,11 @@ impl Film {
             Reel::Sequence(recording.map_err(|e| {
                 miette!(help = "render fewer, or lower imaging.image_height", "{e}")
             })?)
+        } else if let Some(format) = Format::of(output) {
+            let about = format!("insonify, `{}`", scene.name);
+            let frames =
+                Frames::new(about, scene.name.clone(), &scene.probe, simulator.constants());
+            Reel::Exchange(Box::new(frames), format)
         } else {
             Reel::Images(Images::new(output, moments.len() as u32))
         };
@@ -96,7 +121,8 @@ impl Film {
             false => f64::from(index) / shown,
         });
         let ras_from_world = scene.tracker.axes.to_ras();
-        Ok(Self { shown, times: times.collect(), ras_from_world, reel })
+        let times = times.collect();
+        Ok(Self { shown, times, ras_from_world, reel, said, frames: Vec::new() })
     }
 
     /// Adds the last frame of the simulator, the one of this number.
@@ -105,51 +131,123 @@ impl Film {
     /// An error of the device, of the format or of the file system.
     pub fn add(&mut self, index: u32, simulator: &mut Simulator, scene: &Scene) -> Result<()> {
         let (width, height, rgba) = simulator.pixels().into_diagnostic()?;
+        let area = area(simulator);
+        if index == 0 {
+            self.said.insert("image".into(), facts::image(&area));
+        }
+        let mut frame = Map::new();
+        if let Reel::Images(images) = &self.reel {
+            frame.insert("file".into(), name(&images.path(index)));
+        }
+        frame.insert("time_s".into(), json!(self.times[index as usize]));
+        frame.insert("pose".into(), facts::pose(&scene.world_from_probe));
         match &mut self.reel {
             Reel::Images(images) => {
-                dump::png(&images.path(index), width, height, &rgba).into_diagnostic()
+                let mut text = self.said.clone();
+                text.extend(frame.clone());
+                let text = Value::Object(text).to_string();
+                let picture = grey_png([width, height], &rgba, area.pitch, Some(&text));
+                let path = images.path(index);
+                files::replace(&path, &picture)
+                    .map_err(|e| miette!("writing {}: {e}", path.display()))?;
             }
             Reel::Movie(movie) => {
                 let end = f64::from(index + 1) / self.shown;
-                movie.add(width, height, &rgba, end).into_diagnostic()
+                frame.insert("shown_until_s".into(), json!(end));
+                movie.add(width, height, &rgba, end).into_diagnostic()?;
             }
-            Reel::Dicom(film) => film.add(width, height, &rgba).into_diagnostic(),
+            Reel::Dicom(film) => film.add(width, height, &rgba).into_diagnostic()?,
             Reel::Sequence(recording) => {
                 let pose = self.ras_from_world * scene.world_from_probe;
                 recording.add(&rgba, self.times[index as usize], [(POSE, pose)]);
-                Ok(())
+            }
+            Reel::Exchange(frames, format) => {
+                let time = self.times[index as usize];
+                frames.add(*format, simulator, scene, time).into_diagnostic()?;
+                let all = frames.held() / u64::from(index + 1) * self.times.len() as u64;
+                if all > exchange::MOST_BYTES {
+                    return Err(miette!(
+                        help = "render fewer frames, or lower probe.scanlines, probe.samples or \
+                                imaging.image_height",
+                        "{} frames are {} GiB: a file of them holds at most {}",
+                        self.times.len(),
+                        all >> 30,
+                        exchange::MOST_BYTES >> 30
+                    ));
+                }
             }
         }
+        self.frames.push(Value::Object(frame));
+        Ok(())
     }
 
-    /// Writes what is left to write, and says what was written.
+    /// Writes what is left to write, and says what was written. Returns what is said of the frames; of pictures and
+    /// animations that becomes a file beside them, unless the caller writes it all into that file (`elsewhere`).
     ///
     /// # Errors
     /// Errors of the file system.
-    pub fn finish(self, output: &Path) -> Result<()> {
+    pub fn finish(mut self, output: &Path, elsewhere: Option<&Path>) -> Result<Map<String, Value>> {
+        let mut sidecar = None;
         match self.reel {
-            Reel::Images(images) => output::line(&images),
-            Reel::Movie(_) => output::line(output.display()),
+            Reel::Images(images) => {
+                output::line(&images);
+                sidecar = Some(images.sidecar());
+            }
+            Reel::Movie(_) => {
+                output::line(output.display());
+                self.said.insert("file".into(), name(output));
+                sidecar = Some(output.with_extension("json"));
+            }
             Reel::Dicom(film) => {
                 film.finish(1e3 / self.shown).into_diagnostic()?;
                 output::line(output.display());
+                self.said.insert("file".into(), name(output));
             }
             Reel::Sequence(recording) => {
                 recording.finish().write(output)?;
                 output::line(output.display());
+                self.said.insert("file".into(), name(output));
+            }
+            Reel::Exchange(frames, format) => {
+                files::replace(output, &frames.bytes(format))
+                    .map_err(|e| miette!("writing {}: {e}", output.display()))?;
+                output::line(output.display());
+                self.said.insert("file".into(), name(output));
             }
         }
-        Ok(())
+        self.said.insert("frames".into(), self.frames.into());
+        let beside = |path: &PathBuf| elsewhere != Some(path) && !files::is_stream(output);
+        if let Some(path) = sidecar.filter(beside) {
+            let text = serde_json::to_string_pretty(&self.said).into_diagnostic()? + "\n";
+            files::replace(&path, text.as_bytes())
+                .map_err(|e| miette!("writing {}: {e}", path.display()))?;
+        }
+        Ok(self.said)
+    }
+}
+
+/// The last part of a path.
+fn name(path: &Path) -> Value {
+    path.file_name().unwrap_or_default().to_string_lossy().into()
+}
+
+/// Place of the last frame's picture.
+fn area(simulator: &Simulator) -> Area {
+    let frame = simulator.constants();
+    Area {
+        size: [frame.image_width, frame.image_height],
+        pitch: f64::from(frame.pixel_pitch),
+        corner: [frame.image_left, frame.image_top].map(f64::from),
     }
 }
 
 /// The facts that a loop in DICOM states beside its frames.
 fn about(scene: &Scene, simulator: &Simulator) -> About {
-    let frame = simulator.constants();
+    let Area { pitch, corner, .. } = area(simulator);
     About {
         name: scene.name.clone(),
-        pitch: f64::from(frame.pixel_pitch),
-        corner: [frame.image_left, frame.image_top].map(f64::from),
+        pitch,
+        corner,
         frequency: scene.probe.frequency,
         transducer: common::transducer(&scene.probe),
     }

@@ -32,8 +32,8 @@ enum Format {
 /// Refuses a file that could not be written in the end, and scenes whose labels it cannot hold.
 ///
 /// # Errors
-/// An unknown extension, a folder that does not exist, too many tissues for an image of indices.
-pub fn check(path: &Path, scene: &Scene) -> Result<()> {
+/// An unknown extension, a folder that cannot be made, too many tissues for an image of indices.
+pub fn check(path: &Path, frames: u32, scene: &Scene) -> Result<()> {
     let format = format(path)?;
     if format == Format::Image && scene.tissues.len() > usize::from(NOTHING) {
         return Err(miette!(
@@ -43,7 +43,7 @@ pub fn check(path: &Path, scene: &Scene) -> Result<()> {
             scene.tissues.len()
         ));
     }
-    common::in_folder(path)
+    common::writable(&Images::new(path, frames).path(0))
 }
 
 fn format(path: &Path) -> Result<Format> {

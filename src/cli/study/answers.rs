@@ -9,6 +9,8 @@ use insonify::study::key::Key;
 use insonify::study::results::{Results, csv, markdown, plain, ratings};
 use miette::{Context, IntoDiagnostic, Result, miette};
 
+use super::super::common::writable;
+
 /// Arguments of `insonify study answers`.
 #[derive(Debug, Args)]
 pub struct Answers {
@@ -39,6 +41,7 @@ pub fn run(args: &Answers) -> Result<()> {
             ));
         }
     };
+    args.output.iter().chain(&args.ratings).try_for_each(|path| writable(path))?;
     let key = Key::read(&args.key)?;
     let answers = read_all(&args.answers, &key)?;
     for (i, this) in answers.iter().enumerate() {

@@ -77,7 +77,8 @@ pub fn run(args: &Make) -> Result<()> {
 fn load(plan: &Plan, common: &Common) -> Result<Vec<Loaded>> {
     let mut loaded = Vec::new();
     for (i, scenario) in plan.scenarios.iter().enumerate() {
-        let (scene, variants, warnings) = Scene::load_variants(&scenario.scene, &common.overrides)?;
+        let (scene, variants, warnings) =
+            Scene::load_variants(&scenario.scene, &common.overrides(&scenario.scene)?)?;
         common::notes(&warnings);
         check_backgrounds(plan, i, &scene)?;
         loaded.push(Loaded { scene, variants });

@@ -184,7 +184,7 @@ impl Studio {
         Ok(vec![
             step("volume", plain("acquired volume"), levels(&steps.background)),
             step("simulation", plain("simulation alone"), simulated),
-            step("mask", plain("mask"), levels(&steps.mask)),
+            step("mask", plain("mask (white: the acquired volume)"), levels(&steps.mask)),
             Picture {
                 settings: sharp_border.to_vec(),
                 ..step("composed", plain("composed, border sharp"), sharp.whole())

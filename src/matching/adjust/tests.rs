@@ -87,8 +87,8 @@ fn fixed_settings_stay_and_bounds_are_reported() {
     let expected = Imaging { gain: now.gain + 6.0, ..now.clone() };
     assert_eq!((found, notes.len()), (expected, 0));
     let (found, notes) = proposal(&probe, &now, &simulated, &acquired, ALL);
-    assert_eq!((found.dynamic_range, found.psf_scale[0]), (200.0, 4.0));
-    assert!(notes.iter().any(|n| n.contains("dynamic_range would be 480.0 and")), "{notes:?}");
+    assert_eq!((found.dynamic_range, found.psf_scale[0]), (120.0, 4.0));
+    assert!(notes.iter().any(|n| n.contains("dynamic_range would be 480.0, not")), "{notes:?}");
     assert!(
         notes.iter().any(|n| n.contains("psf_scale (axial)") && n.contains("averaged away")),
         "{notes:?}"

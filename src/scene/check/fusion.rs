@@ -147,6 +147,6 @@ mod tests {
         assert!(text.ends_with("0 errors, 0 warnings"), "{text}");
         let text = scene(200).to_string();
         assert!(text.contains("mask ball: 0.519 ml, off the image"), "{text}");
-        assert!(text.ends_with("0 errors, 1 warnings"), "{text}");
+        assert!(text.ends_with("0 errors, 1 warning"), "{text}");
     }
 }

@@ -50,8 +50,14 @@ impl fmt::Display for Report {
             writeln!(f, "{issue}")?;
         }
         let errors = self.count(Severity::Error) + usize::from(self.error.is_some());
-        write!(f, "{errors} errors, {} warnings", self.count(Severity::Warning))
+        f.write_str(&tally(errors, self.count(Severity::Warning)))
     }
+}
+
+/// The last row of a report: `1 error, 2 warnings`.
+pub fn tally(errors: usize, warnings: usize) -> String {
+    let count = |n: usize, noun: &str| format!("{n} {noun}{}", if n == 1 { "" } else { "s" });
+    format!("{}, {}", count(errors, "error"), count(warnings, "warning"))
 }
 
 /// Checks a scene (.toml) or a mesh file.

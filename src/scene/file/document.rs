@@ -13,7 +13,7 @@ use toml::de::{DeTable, DeValue};
 
 use super::error::{SceneError, advice};
 use super::schema::File;
-use crate::scene::Mesh;
+use crate::scene::{Mesh, shipped};
 use crate::settings::{Facts, Value};
 pub use paths::quoted;
 pub(super) use paths::{LISTS, element};
@@ -55,7 +55,9 @@ impl Source {
     /// Reads the file and stores the overrides.
     pub fn read(path: &Path, overrides: &[(String, String)]) -> Result<Self, SceneError> {
         let fail = |cause: String, remedy| SceneError::file(path, cause, remedy);
-        let check = "check the path of the scene file";
+        let check =
+            format!("check the path of the scene file; scenes that ship: {}", shipped::names());
+        let check = check.as_str();
         let unreadable = |e: std::io::Error| fail(format!("cannot be read: {e}"), check);
         let info = std::fs::metadata(path).map_err(unreadable)?;
         if info.is_dir() {

@@ -4,7 +4,7 @@ use super::document::{LISTS, segments};
 use super::schema::reference;
 use super::setting::setting;
 use crate::scene::Scene;
-use crate::settings::{Facts, Group, Value};
+use crate::settings::{Facts, Group, Settings, Value};
 
 /// The facts about the key at a path: `imaging.gain`, `tissues.liver.speed`.
 ///
@@ -29,19 +29,28 @@ pub fn facts(path: &str) -> Result<&'static Facts, String> {
 
 /// The value of a key in `scene`; none of keys that a scene holds in another form, as those of geometry.
 pub fn value(scene: &Scene, path: &str) -> Option<Value> {
-    fn of<T: Group>(settings: &T, key: &str) -> Option<Value> {
-        T::row(key).map(|row| (row.get)(settings))
-    }
     let parts = segments(path);
     let key = |at: usize| parts.get(at..).map(|parts| parts.join("."));
     match parts[0].as_str() {
-        "probe" => of(&scene.probe, &key(1)?),
-        "simulation" => of(&scene.simulation, &key(1)?),
-        "imaging" => of(&scene.imaging, &key(1)?),
         "live" => of(&scene.live, &key(1)?),
         "tissues" => of(scene.tissues.iter().find(|t| Some(&t.name) == parts.get(1))?, &key(2)?),
+        _ => value_of_settings(&scene.settings, path),
+    }
+}
+
+/// The value of a key in `settings`; none of keys of other tables than `probe`, `simulation` and `imaging`.
+pub fn value_of_settings(settings: &Settings, path: &str) -> Option<Value> {
+    let (table, key) = path.split_once('.')?;
+    match table {
+        "probe" => of(&settings.probe, key),
+        "simulation" => of(&settings.simulation, key),
+        "imaging" => of(&settings.imaging, key),
         _ => None,
     }
+}
+
+fn of<T: Group>(settings: &T, key: &str) -> Option<Value> {
+    T::row(key).map(|row| (row.get)(settings))
 }
 
 /// Paths of all keys of scene files; `NAME` stands for the name of a tissue, a mesh or another element of a list.

@@ -4,18 +4,23 @@
 use std::path::{Component, Path, PathBuf};
 
 use toml_edit::visit_mut::{VisitMut, visit_table_like_kv_mut};
-use toml_edit::{DocumentMut, InlineTable, Item, KeyMut, Table, TableLike, Value};
+use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, KeyMut, Table, TableLike, Value};
 
 use super::document::{Misfit, Source, element, segments};
 use super::error::SceneError;
 use super::placing::placed;
 use super::tissues::Tissues;
-use super::{probe, settings};
+use super::{poses, probe, settings, tasks};
 use crate::output::files;
+use crate::scene::shipped;
 
 /// A setting to be written: its path, as [`crate::scene::Scene::load`] takes it, and its value, or none if
-/// the key is to be removed. Names with dots are quoted, as in TOML: `mesh."a.b".roughness`.
+/// the key is to be removed. Names with dots are quoted, as in TOML: `mesh."a.b".roughness`. A `pose` is added under a
+/// name that the file does not have, and removed as a whole.
 pub type Entry = (String, Option<String>);
+
+/// The list of named poses, which alone grows and shrinks.
+const POSES: &str = "pose";
 
 /// A comment above the key at a path: the path, and one line of text. It takes the place of comments there
 /// that begin with the same word.
@@ -43,6 +48,14 @@ pub fn save_with(
     notes: &[Note],
 ) -> Result<(), SceneError> {
     let misfit = |(message, remedy): Misfit| SceneError::file(from, message, &remedy);
+    if shipped::is_shipped(to) {
+        let cause = "ships with the program and stays as it is".to_owned();
+        return Err(SceneError::file(
+            to,
+            cause,
+            "save the scene under another name, in a folder of yours",
+        ));
+    }
     let source = Source::read(from, &[])?;
     // The scene file's parser gives an error with a remedy; that of toml_edit has none.
     source.document()?;
@@ -54,7 +67,11 @@ pub fn save_with(
         let segments = segments(path);
         let segments: Vec<_> = segments.iter().map(String::as_str).collect();
         let value = value.as_deref().map(parsed);
-        into_table(document.as_table_mut(), &segments, value).map_err(misfit)?;
+        match &segments[..] {
+            [POSES, path @ ..] => into_pose(document.as_table_mut(), path, value),
+            path => into_table(document.as_table_mut(), path, value),
+        }
+        .map_err(misfit)?;
     }
     for (path, text) in notes {
         let segments = segments(path);
@@ -87,6 +104,8 @@ fn check(source: &Source) -> Result<(), SceneError> {
     let file = document.parse()?;
     settings::settings(&document, &file, None)?;
     probe::pose(&document, "probe", &file.probe.stated)?;
+    let poses = poses::build(&document, &file.pose)?;
+    tasks::poses_exist(&document, &file.task, &poses)?;
     for (i, table) in file.transform.iter().enumerate() {
         placed(&document, &format!("transform.{i}"), &table.stated)?;
     }
@@ -149,6 +168,35 @@ fn into_table(
         Some(inner) => into_value(inner, first, rest, value),
         None => Err(whole(first)),
     }
+}
+
+/// Sets a key of the pose that the path's first part names, which is added where it is not there; without keys
+/// behind its name it is removed.
+fn into_pose(root: &mut Table, path: &[&str], value: Option<Value>) -> Result<(), Misfit> {
+    let (name, rest) = path.split_first().ok_or_else(|| whole(POSES))?;
+    let item = root.entry(POSES).or_insert(Item::ArrayOfTables(ArrayOfTables::new()));
+    // A list of inline tables becomes one of tables.
+    let tables = std::mem::take(item).into_array_of_tables().map_err(|_| whole(POSES))?;
+    *item = Item::ArrayOfTables(tables);
+    let poses = item.as_array_of_tables_mut().expect("just made");
+    let index = poses.iter().position(|pose| name_of(pose).as_deref() == Some(name));
+    match (index, rest, value) {
+        (Some(index), [], None) => drop(poses.remove(index)),
+        (None, _, None) => {}
+        (_, [], Some(_)) => return Err(whole(POSES)),
+        (Some(index), rest, value) => {
+            let pose = poses.get_mut(index).expect("one of them");
+            return into_table(pose, rest, value);
+        }
+        (None, rest, value) => {
+            let mut pose = Table::new();
+            pose.decor_mut().set_prefix("\n");
+            pose.insert("name", Item::Value(Value::from(*name)));
+            into_table(&mut pose, rest, value)?;
+            poses.push(pose);
+        }
+    }
+    Ok(())
 }
 
 fn into_value(
@@ -246,6 +294,34 @@ fn note(table: &mut dyn TableLike, path: &[&str], text: &str) -> Result<(), Misf
     Ok(())
 }
 
+/// The files that the scene file at `path` names; none if it cannot be read.
+pub fn named_files(path: &Path) -> Option<Vec<PathBuf>> {
+    let mut document: DocumentMut = std::fs::read_to_string(path).ok()?.parse().ok()?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let mut named = Named(Vec::new());
+    named.visit_document_mut(&mut document);
+    Some(named.0.into_iter().map(|file| folder.join(file)).collect())
+}
+
+/// Keys whose values are names of files.
+const NAMING: [&str; 2] = ["file", "keyframes"];
+
+/// Collects the names of files.
+struct Named(Vec<String>);
+
+impl VisitMut for Named {
+    fn visit_table_like_kv_mut(&mut self, key: KeyMut<'_>, item: &mut Item) {
+        match item.as_value() {
+            Some(value) if NAMING.contains(&key.get()) => {
+                let several = value.as_array().into_iter().flatten();
+                let all = several.chain([value]).filter_map(Value::as_str);
+                self.0.extend(all.map(str::to_owned));
+            }
+            _ => visit_table_like_kv_mut(self, key, item),
+        }
+    }
+}
+
 /// Names the files of a scene from another folder.
 struct Moved {
     old: PathBuf,
@@ -254,7 +330,7 @@ struct Moved {
 
 impl VisitMut for Moved {
     fn visit_table_like_kv_mut(&mut self, key: KeyMut<'_>, item: &mut Item) {
-        let named = ["file", "keyframes"].contains(&key.get());
+        let named = NAMING.contains(&key.get());
         match item.as_value_mut() {
             Some(value) if named => self.rename(value),
             _ => visit_table_like_kv_mut(self, key, item),

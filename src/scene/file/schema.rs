@@ -15,9 +15,11 @@ use super::motion::{Cycle, MotionKeys, Updates};
 use super::nodes::NodeKeys;
 use super::placing::{Affine, Placed, Size, Stretch};
 use super::playing::Following;
+use super::poses::PoseKeys;
 use super::probe::{Pose, PresetKey};
 use super::shelf::{MeshKeys, ShapeKeys};
 use super::table::{Key, Keys, Table, defaults, keys};
+use super::tasks::TaskKeys;
 use super::tissues::TissueKeys;
 use super::tracker::{MatrixKey, TrackerKeys};
 use super::vary::VaryKeys;
@@ -45,6 +47,10 @@ pub struct File {
     pub probe: Table<Probe>,
     #[serde(default)]
     pub simulation: Table<Simulation>,
+    #[serde(default)]
+    pub pose: Vec<Table<PoseKeys>>,
+    #[serde(default)]
+    pub task: Vec<Table<TaskKeys>>,
     #[serde(default)]
     pub imaging: Table<Imaging>,
     #[serde(default)]
@@ -92,6 +98,8 @@ macro_rules! tables {
 tables! {
     Title, "": defaults::<Title>("");
     Probe, "probe": defaults::<PresetKey>(""), keys::<Probe>("", "preset"), defaults::<Pose>("pose.");
+    PoseKeys, "pose": defaults::<PoseKeys>(""), defaults::<Pose>("");
+    TaskKeys, "task": defaults::<TaskKeys>(""), defaults::<Pose>("");
     MeshKeys, "mesh": defaults::<NodeKeys>(""), defaults::<MeshKeys>(""), defaults::<Cycle>(""),
         defaults::<Updates>(""), defaults::<Following>(""), defaults::<Stretch>(""), defaults::<Placed>(""),
         defaults::<Affine>(""), keys::<Surface>("", ""), keys::<Surface>("inside.", "as outside"), defaults::<ShapeKeys>("shape.");
@@ -137,6 +145,8 @@ impl File {
         one(document, self.contact.as_ref())?;
         one(document, &self.tracker)?;
         one(document, &self.live)?;
+        all(document, &self.pose)?;
+        all(document, &self.task)?;
         all(document, &self.group)?;
         all(document, &self.transform)?;
         all(document, &self.selector)?;

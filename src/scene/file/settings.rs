@@ -2,11 +2,12 @@
 
 use std::path::Path;
 
-use super::document::{Document, Source};
+use super::document::{Document, Source, segments};
 use super::error::SceneError;
-use super::probe;
 use super::schema::File;
-use crate::settings::{Settings, Simulation};
+use super::table::entries;
+use super::{presentable, probe};
+use crate::settings::{Group, Imaging, Probe, Settings, Simulation};
 
 /// The settings stated in the tables `probe`, `simulation` and `imaging` of `file`. Defaults of `simulation` that
 /// follow the frequency are those of a probe of `frequency` MHz, or without it of the file's probe.
@@ -55,6 +56,58 @@ pub fn load_settings(path: &Path, settings: &mut Settings) -> Result<(), SceneEr
     if has_imaging {
         settings.imaging = found.imaging;
     }
+    Ok(())
+}
+
+/// Gives `settings` the values of these entries, as `--set` takes them: of keys in `probe`, `simulation` and `imaging`.
+///
+/// # Errors
+/// The first entry that does not fit; `settings` are then unchanged.
+pub fn put_settings(pairs: &[(String, String)], settings: &mut Settings) -> Result<(), SceneError> {
+    let place = Path::new("command");
+    let tables = [Probe::TABLE, Simulation::TABLE, Imaging::TABLE];
+    for (path, _) in pairs {
+        let parts = segments(path);
+        if !tables.contains(&parts[0].as_str()) || parts.get(1).is_some_and(|key| key == "pose") {
+            return Err(SceneError::file(
+                place,
+                format!("`{path}` is no setting of a running window"),
+                "set keys of [probe], [simulation] and [imaging]; `insonify serve` takes any",
+            ));
+        }
+    }
+    // As a file says it: before its division for scatterers that do not fit into the cells.
+    let cell = settings.simulation.cell * settings.simulation.crowding();
+    let own = Simulation { cell, ..settings.simulation.clone() };
+    let own = [
+        entries(&settings.probe, Probe::TABLE),
+        entries(&own, Simulation::TABLE),
+        entries(&settings.imaging, Imaging::TABLE),
+    ];
+    let sets = |path: &str| pairs.iter().any(|(set, _)| set == path);
+    let is_kept = |path: &str| {
+        // Those of a preset are the preset's.
+        !(sets(path) || sets("probe.preset") && path.starts_with("probe."))
+    };
+    let own = own.concat().into_iter().filter(|(path, _)| is_kept(path));
+    let own = own.filter_map(|(path, value)| Some((path, value?)));
+    let all: Vec<_> = own.chain(pairs.iter().cloned()).collect();
+    let source = Source::of(place, String::new()).with(&all);
+    let document = source.document()?;
+    let mut found = self::settings(&document, &document.parse()?, None)?;
+    if !sets("simulation.cell") {
+        let frequency = std::mem::replace(&mut settings.probe.frequency, found.probe.frequency);
+        let mut followed = settings.clone();
+        settings.probe.frequency = frequency;
+        followed.follow_frequency(frequency);
+        match sets("simulation.density_scale") {
+            true => found.simulation.cell *= followed.simulation.cell / settings.simulation.cell,
+            // To the bit.
+            false => found.simulation.cell = followed.simulation.cell,
+        }
+    }
+    presentable(&document, &found)?;
+    *settings = found;
     Ok(())
 }
 

@@ -296,6 +296,24 @@ fn coincident_triangles_are_counted_and_named() {
 }
 
 #[test]
+fn settings_that_keep_something_out_of_the_picture_are_told_with_their_line() {
+    let text =
+        "[probe]\npreset = \"linear\"\nslice_thickness = 0\n[simulation]\nmin_weight = 0.5\n";
+    let (_, warnings) = Case::new().load(text, &[]).expect("in range");
+    let told: Vec<_> = warnings.iter().map(ToString::to_string).collect();
+    for (warning, parts) in told.iter().zip([
+        ["s.toml: line 3: ", "there will be no speckle; ", "give it some mm"],
+        ["s.toml: line 5: ", "nothing is seen; ", "give 0.01 or less"],
+    ]) {
+        assert!(parts.iter().all(|part| warning.contains(part)), "{warning}");
+    }
+    assert_eq!(told.len(), 2, "{told:?}");
+    let set = [("probe.slice_thickness", "0")];
+    let (_, warnings) = Case::new().load("[probe]\npreset = \"linear\"\n", &set).expect("in range");
+    assert!(warnings[0].to_string().starts_with("warning: --set: line 1: "), "{warnings:?}");
+}
+
+#[test]
 fn times_may_have_a_unit() {
     for (text, value) in [("0.4", 0.4), ("400 ms", 0.4), ("-1s", -1.0)] {
         assert_eq!(DURATION.finite(text), Ok(value));

@@ -1,4 +1,4 @@
-//! Free file names, and PNG files that carry their settings.
+//! Free file names, and pictures in colour.
 
 use std::fs::{File, OpenOptions};
 use std::io::{Cursor, ErrorKind, Write as _};
@@ -27,7 +27,7 @@ impl Claim {
         for number in 1.. {
             let base = format!("{stem}-{number:04}");
             let is_taken = |end: &str| folder.join(format!("{base}{end}")).exists();
-            if ["", ".png", ".gif", "-marked.png"].into_iter().any(is_taken) {
+            if ["", ".png", ".gif", "-marked.png", "-mmode.png"].into_iter().any(is_taken) {
                 continue;
             }
             let path = folder.join(format!("{base}.json"));
@@ -94,40 +94,24 @@ pub(super) fn name(path: &Path) -> Value {
     Value::from(name.to_string_lossy())
 }
 
+/// Writes a file under the lowest free number of its stem and ending; returns its path.
+pub(super) fn write_next(
+    folder: &Path,
+    stem: &str,
+    ending: &str,
+    bytes: &[u8],
+) -> Result<PathBuf, CaptureError> {
+    std::fs::create_dir_all(folder).map_err(|e| CaptureError::file(folder, e))?;
+    let mut paths = (1..).map(|number| folder.join(format!("{stem}-{number:04}.{ending}")));
+    let path = paths.find(|path| !path.exists()).expect("there is a number behind each");
+    write_new(&path, bytes)?;
+    Ok(path)
+}
+
 /// Writes a file that must not exist.
 pub(super) fn write_new(path: &Path, bytes: &[u8]) -> Result<(), CaptureError> {
     let opened = OpenOptions::new().write(true).create_new(true).open(path);
     opened.and_then(|mut file| file.write_all(bytes)).map_err(|e| CaptureError::file(path, e))
-}
-
-/// A PNG file in 8-bit grey, the red channel of `rgba`: pixels of `pitch` mm, and a text under the
-/// keyword `insonify`.
-pub(super) fn grey_png(
-    [width, height]: [u32; 2],
-    rgba: &[u8],
-    pitch: f64,
-    text: Option<&str>,
-) -> Vec<u8> {
-    let grey: Vec<u8> = rgba.chunks_exact(4).map(|p| p[0]).collect();
-    let per_metre = (1000.0 / pitch).round() as u32;
-    let mut out = Vec::new();
-    let mut encoder = png::Encoder::new(&mut out, width, height);
-    encoder.set_color(png::ColorType::Grayscale);
-    encoder.set_pixel_dims(Some(png::PixelDimensions {
-        xppu: per_metre,
-        yppu: per_metre,
-        unit: png::Unit::Meter,
-    }));
-    if let Some(text) = text {
-        let added = encoder.add_itxt_chunk("insonify".into(), text.into());
-        added.expect("nothing is written yet");
-    }
-    let written = encoder.write_header().and_then(|mut writer| {
-        writer.write_image_data(&grey)?;
-        writer.finish()
-    });
-    written.expect("one byte per pixel, into memory");
-    out
 }
 
 /// A PNG file in colour, without scale or text.
@@ -152,7 +136,7 @@ pub(super) fn scaled(rgba: Vec<u8>, [width, height]: [u32; 2], to: [u32; 2]) -> 
 mod tests {
     use std::path::Path;
 
-    use super::{Claim, Sidecar, grey_png, write_new};
+    use super::{Claim, Sidecar, write_new};
 
     #[test]
     fn numbers_are_taken_once() {
@@ -189,41 +173,5 @@ mod tests {
             Err(error) => error.to_string(),
         };
         assert!(text.contains("cannot be written") && text.contains("Name a folder"), "{text}");
-    }
-
-    #[test]
-    fn a_picture_keeps_its_greys_and_says_what_it_is() {
-        let rgba: Vec<u8> = (0..=255).flat_map(|g| [g, g, g, 255]).collect();
-        let text = "{\"title\": \"Fœtus\"}";
-        let png = grey_png([32, 8], &rgba, 0.2, Some(text));
-        let back = image::load_from_memory(&png).expect("a PNG").to_luma8();
-        assert_eq!(back.into_raw(), (0..=255).collect::<Vec<u8>>());
-        let chunks = chunks(&png);
-        let kinds: Vec<&str> = chunks.iter().map(|c| c.0).collect();
-        assert_eq!(kinds, ["IHDR", "pHYs", "iTXt", "IDAT", "IEND"]);
-        assert_eq!(chunks[1].1, [0, 0, 0x13, 0x88, 0, 0, 0x13, 0x88, 1], "5000 a metre");
-        let (keyword, rest) = chunks[2].1.split_at(13);
-        assert_eq!((keyword, rest), (&b"insonify\0\0\0\0\0"[..], text.as_bytes()));
-    }
-
-    /// Type and content of each, with the sum that the format's own program computes (PNG, third
-    /// edition, annex D): independent of the one that wrote it.
-    fn chunks(mut png: &[u8]) -> Vec<(&str, &[u8])> {
-        let word = |bytes: &[u8]| u32::from_be_bytes(bytes[..4].try_into().unwrap());
-        let mut out = Vec::new();
-        png = &png[8..];
-        while !png.is_empty() {
-            let length = word(png) as usize;
-            let body = &png[4..8 + length];
-            let sum = body.iter().fold(u32::MAX, |sum, &byte| {
-                (0..8).fold(sum ^ u32::from(byte), |c, _| {
-                    if c & 1 == 1 { 0xedb8_8320 ^ (c >> 1) } else { c >> 1 }
-                })
-            });
-            assert_eq!(!sum, word(&png[8 + length..]));
-            out.push((std::str::from_utf8(&body[..4]).unwrap(), &body[4..]));
-            png = &png[12 + length..];
-        }
-        out
     }
 }

@@ -1,5 +1,6 @@
 //! The section for devices that move the probe, and for the network.
 
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use egui::{DragValue, RichText, TextEdit, Ui};
@@ -7,12 +8,15 @@ use egui::{DragValue, RichText, TextEdit, Ui};
 use super::controls::grid;
 use crate::igtl::{OPEN, TrackerState};
 use crate::view::inputs::Inputs;
+use crate::view::leaving::{self, Way};
 use crate::view::link::Report;
 use crate::view::model::{Model, Source, age};
 use crate::view::pads::Word;
+use crate::view::state::State;
 use crate::view::style::{self, button};
 
-pub(super) fn show(ui: &mut Ui, model: &mut Model, inputs: &mut Inputs, now: Instant) {
+pub(super) fn show(ui: &mut Ui, model: &mut Model, state: &mut State, now: Instant) {
+    let inputs = &mut state.inputs;
     let holder = model.devices.holder();
     grid(ui, "devices", |ui| {
         device(ui, "Keyboard", holder == Some(Source::Keyboard), |ui| {
@@ -31,8 +35,8 @@ pub(super) fn show(ui: &mut Ui, model: &mut Model, inputs: &mut Inputs, now: Ins
     ui.add_space(4.0);
     network(ui, inputs);
     ui.add_space(4.0);
-    way(ui, model, now);
-    file(ui, model, inputs);
+    way(ui, model, state, now);
+    file(ui, model, state, now);
 }
 
 /// Draws a row: a device, marked where it has the probe, and its state.
@@ -132,12 +136,12 @@ fn replay(model: &Model, now: Instant) -> String {
 }
 
 /// Draws the controls for recording and replay.
-fn way(ui: &mut Ui, model: &mut Model, now: Instant) {
+fn way(ui: &mut Ui, model: &mut Model, state: &mut State, now: Instant) {
     ui.horizontal(|ui| {
         let is_recording = model.trajectory.recorder.is_some();
         let word = if is_recording { "Stop recording" } else { "Record" };
         if button(ui, word, "Record where the probe goes, whatever moves it (R)") {
-            model.record(now);
+            leaving::record(model, state, now);
         }
         if is_recording {
             // The seconds count on while nothing else is drawn.
@@ -161,23 +165,26 @@ fn way(ui: &mut Ui, model: &mut Model, now: Instant) {
 }
 
 /// Draws the controls for the trajectory's file.
-fn file(ui: &mut Ui, model: &mut Model, inputs: &mut Inputs) {
+fn file(ui: &mut Ui, model: &mut Model, state: &mut State, now: Instant) {
+    let inputs = &mut state.inputs;
+    let mut loads = false;
     ui.horizontal(|ui| {
         let field = TextEdit::singleline(&mut inputs.path).desired_width(180.0);
         ui.add(field)
             .on_hover_text("Trajectory file (.csv): time_s, x_mm, y_mm, z_mm, qw, qx, qy, qz");
-        let unsaved = model.trajectory.stored.as_ref().is_some_and(|k| k.unsaved.is_some());
-        let replaces = std::path::Path::new(&inputs.path).exists();
-        let word = if replaces && unsaved { "Replace" } else { "Save" };
+        let unsaved = model.unsaved_trajectory().is_some();
+        let asked = Path::new(&inputs.path).exists() && !inputs.would_replace();
+        let word = if asked && unsaved { "Replace it" } else { "Save" };
         let save = ui.add_enabled(unsaved, egui::Button::new(word));
         if save.on_hover_text("Write what was recorded").clicked() {
-            inputs.save(&mut model.trajectory);
+            inputs.save_or_ask(&mut model.trajectory);
         }
-        if button(ui, "Load", "Read a trajectory") {
-            inputs.load(&mut model.trajectory);
-        }
+        loads = button(ui, "Load", "Read a trajectory");
     });
     if let Some(problem) = &inputs.problem {
         ui.label(RichText::new(problem).color(style::WARN));
+    }
+    if loads {
+        leaving::leave(Way::LoadTrajectory, model, state, now);
     }
 }

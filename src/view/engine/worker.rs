@@ -1,5 +1,6 @@
 //! The work of the simulation's thread.
 
+mod columns;
 mod pictures;
 
 use std::sync::Arc;
@@ -18,6 +19,7 @@ use crate::sim::{self, SimError, Simulator, Tracer};
 use crate::view::link::{Broadcast, Link};
 use crate::view::model::{Order, Settings};
 use crate::view::ring::Ring;
+use columns::Columns;
 
 /// The last picture, and the state that it left on the device.
 struct Imaged {
@@ -37,6 +39,8 @@ struct Taken {
     seconds: f64,
     /// Level of the ladder; none leaves it to the pace.
     level: Option<usize>,
+    /// Moment at which they were decided.
+    at: Instant,
 }
 
 /// The state of the thread.
@@ -58,6 +62,8 @@ pub(super) struct Worker {
     left: Option<Imaged>,
     /// Chooses the counts of the next picture.
     pace: Pace,
+    /// Columns of the M-mode strip.
+    columns: Columns,
     /// End and duration of the last picture of the anatomy.
     view3d_made: (Instant, Duration),
     wake: Wake,
@@ -86,6 +92,7 @@ impl Worker {
             last: None,
             left: None,
             pace: Pace::new(machine),
+            columns: Columns::new(),
             view3d_made: (Instant::now(), Duration::ZERO),
             wake,
         }
@@ -111,6 +118,7 @@ impl Worker {
                         pose: left.pose,
                         seconds: left.seconds,
                         level: Some(level),
+                        at: Instant::now(),
                     },
                     None => continue,
                 },
@@ -130,7 +138,8 @@ impl Worker {
                 },
             };
             index += u32::from(taken.level.is_none());
-            let frame = self.carry_out(&mut simulator, &taken);
+            let film = self.columns(&mut simulator, &taken);
+            let frame = film.and_then(|film| self.carry_out(&mut simulator, &taken, film));
             match (&frame, &mut self.left) {
                 (Err(SimError::Gpu(GpuError::Abandoned)), _) => continue,
                 // A picture that cannot be refined stays as it is.
@@ -140,7 +149,7 @@ impl Worker {
             if taken.level.is_none() {
                 self.last = Some(taken.order);
             }
-            let told = frame.map(|(frame, pixels)| News::Frame(Box::new(frame), pixels));
+            let told = frame.map(|(frame, film)| News::Frame(Box::new(frame), film));
             if !self.report(told, simulator.is_none()) {
                 return;
             }
@@ -176,7 +185,8 @@ impl Worker {
     /// The contents of an order's image at this moment.
     fn taken(&self, order: Order, index: u32) -> Taken {
         let now = Instant::now();
-        Taken { pose: order.pose(now), seconds: order.clock.at(now), order, index, level: None }
+        let (pose, seconds) = (order.pose(now), order.clock.at(now));
+        Taken { pose, seconds, order, index, level: None, at: now }
     }
 
     /// Hands news over; returns whether there will be more.

@@ -3,49 +3,10 @@
 use std::f64::consts::PI;
 
 use glam::DVec2;
+use serde::{Deserialize, Serialize};
 
-/// Kind of a measurement.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    /// Distance between two points, mm.
-    Distance,
-    /// Circumference and area: the ends of one axis, then half the other.
-    Ellipse,
-    /// Angle between two arms: a point on one, the vertex, a point on the other.
-    Angle,
-}
-
-impl Kind {
-    /// All kinds.
-    pub const ALL: [Self; 3] = [Self::Distance, Self::Ellipse, Self::Angle];
-
-    /// Name of the kind.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Distance => "distance",
-            Self::Ellipse => "ellipse",
-            Self::Angle => "angle",
-        }
-    }
-
-    /// Number of its points.
-    pub fn points(self) -> usize {
-        match self {
-            Self::Distance => 2,
-            Self::Ellipse | Self::Angle => 3,
-        }
-    }
-
-    /// Names that such a measurement has in obstetrics, of the abdomen and the heart (ISUOG Practice
-    /// Guidelines 2019, AIUM); others are typed.
-    pub fn labels(self) -> &'static [&'static str] {
-        match self {
-            Self::Distance => &["BPD", "OFD", "CRL", "FL", "HL", "NT", "AP", "LVIDd", "IVSd"],
-            Self::Ellipse => &["HC", "AC", "cyst", "lesion"],
-            Self::Angle => &["alpha", "beta", "progression"],
-        }
-    }
-}
+pub use crate::exam::Kind;
+use crate::exam::Measured;
 
 /// Result of a measurement.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,10 +24,17 @@ pub enum Reading {
     },
     /// Angle, 0 to 180 degrees.
     Angle(f64),
+    /// Size of a traced outline.
+    Trace {
+        /// Circumference, mm.
+        circumference: f64,
+        /// Area, mm^2.
+        area: f64,
+    },
 }
 
-/// A measurement and its points, as many as [`Kind::points`].
-#[derive(Clone, Debug, PartialEq)]
+/// A measurement and its points, as many as [`Kind::points`] says.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Caliper {
     /// Kind of the measurement.
     pub kind: Kind,
@@ -80,9 +48,9 @@ impl Caliper {
     /// A measurement without a name.
     ///
     /// # Panics
-    /// When there are not as many points as `kind` takes.
+    /// When there are not as many points as `kind` takes: of a trace, three.
     pub fn new(kind: Kind, points: Vec<DVec2>) -> Self {
-        assert_eq!(points.len(), kind.points());
+        assert!(kind.points().map_or(points.len() >= 3, |count| points.len() == count));
         let mut made = Self { kind, points, label: String::new() };
         made.settle();
         made
@@ -124,7 +92,32 @@ impl Caliper {
                 let angle = if is_drawn { arms[0].angle_to(arms[1]) } else { 0.0 };
                 Reading::Angle(angle.abs().to_degrees())
             }
+            Kind::Trace => {
+                let next = |i: usize| p[(i + 1) % p.len()];
+                let sides = p.iter().enumerate().map(|(i, point)| (*point, next(i)));
+                let (around, twice) = sides.fold((0.0, 0.0), |(around, twice), (a, b)| {
+                    (around + a.distance(b), twice + a.perp_dot(b))
+                });
+                Reading::Trace { circumference: around, area: f64::abs(twice) / 2.0 }
+            }
         }
+    }
+
+    /// The measurement for the worksheet.
+    pub fn measured(&self) -> Measured {
+        let mut out = Measured { name: self.label.clone(), ..Measured::default() };
+        match self.reading() {
+            Reading::Distance(mm) => out.length = Some(mm),
+            Reading::Angle(degrees) => out.angle = Some(degrees),
+            Reading::Ellipse { circumference, area, .. }
+            | Reading::Trace { circumference, area } => {
+                (out.circumference, out.area) = (Some(circumference), Some(area));
+            }
+        }
+        if self.kind == Kind::Trace {
+            out.outline.clone_from(&self.points);
+        }
+        out
     }
 
     /// A point of the outline of an ellipse, `angle` radians from the first end of its first axis.
@@ -147,7 +140,7 @@ impl Caliper {
     fn half_width(&self) -> f64 {
         match self.kind {
             Kind::Ellipse => (self.points[2] - self.centre()).dot(self.normal()),
-            Kind::Distance | Kind::Angle => 0.0,
+            Kind::Distance | Kind::Angle | Kind::Trace => 0.0,
         }
     }
 
@@ -256,6 +249,18 @@ mod tests {
         close(moved.points[2].x, 25.0);
         moved.shift(dvec2(1.0, -1.0));
         close(moved.points[2].x, 26.0);
+    }
+
+    #[test]
+    fn a_trace_is_measured_along_its_sides() {
+        let square = made(Kind::Trace, &[[1.0, 1.0], [1.0, 4.0], [4.0, 4.0], [4.0, 1.0]]);
+        assert_eq!(square.reading(), Reading::Trace { circumference: 12.0, area: 9.0 });
+        let circle: Vec<DVec2> =
+            (0..2000).map(|i| 25.0 * DVec2::from_angle(PI * f64::from(i) / 1000.0)).collect();
+        let measured = Caliper::new(Kind::Trace, circle).measured();
+        assert!((measured.area.expect("closed") / (625.0 * PI) - 1.0).abs() < 1e-5);
+        assert!((measured.circumference.expect("closed") / (50.0 * PI) - 1.0).abs() < 1e-5);
+        assert_eq!(measured.outline.len(), 2000);
     }
 
     #[test]

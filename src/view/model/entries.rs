@@ -69,8 +69,13 @@ pub(super) fn switch(origin: &Origin) -> String {
     }
 }
 
-/// The pose of the probe, to a ten thousandth of a millimetre.
+/// The pose of the probe at the start, to a ten thousandth of a millimetre.
 pub(super) fn pose(pose: &DAffine3) -> Vec<Entry> {
+    pose_at("probe.pose", pose)
+}
+
+/// A pose of the probe in the table `path`, to a ten thousandth of a millimetre.
+pub(super) fn pose_at(path: &str, pose: &DAffine3) -> Vec<Entry> {
     let list = |v: DVec3, unit: f64| {
         // Minus zero becomes zero.
         let parts = v.to_array().map(|x| plain((x * unit).round() / unit + 0.0));
@@ -78,9 +83,9 @@ pub(super) fn pose(pose: &DAffine3) -> Vec<Entry> {
     };
     let (direction, lateral) = (pose.matrix3.z_axis, pose.matrix3.x_axis);
     vec![
-        ("probe.pose.position".into(), list(pose.translation, 1e4)),
-        ("probe.pose.direction".into(), list(direction, 1e7)),
-        ("probe.pose.lateral".into(), list(lateral, 1e7)),
+        (format!("{path}.position"), list(pose.translation, 1e4)),
+        (format!("{path}.direction"), list(direction, 1e7)),
+        (format!("{path}.lateral"), list(lateral, 1e7)),
     ]
 }
 

@@ -1,35 +1,55 @@
-//! Undo: earlier settings.
+//! Undo: what was before each change of settings, poses, marks and recordings.
 
 use std::time::{Duration, Instant};
 
-use super::Settings;
+use glam::DAffine3;
 
-/// Changes of one setting that follow each other faster count as one: the drag of a slider.
+use super::sheet::Mark;
+use super::{KnownPose, Model, Settings, Source, StoredTrajectory, entries};
+
+/// Changes of one thing that follow each other faster count as one: the drag of a slider, a pressed key.
 const GESTURE: Duration = Duration::from_millis(700);
 /// Number of steps that are kept.
 const DEPTH: usize = 100;
 
-/// Settings before each change, and those undone.
+/// What was before a change.
+pub(super) enum Step {
+    /// The settings of the console.
+    Settings(Box<Settings>),
+    /// World from probe.
+    Pose(DAffine3),
+    /// The named poses.
+    Poses(Vec<KnownPose>),
+    /// Measurements and texts.
+    Marks(Vec<Mark>),
+    /// The recorded or loaded trajectory.
+    Trajectory(Option<StoredTrajectory>),
+}
+
+/// What was before each change, and what was undone.
 #[derive(Default)]
 pub(super) struct History {
-    past: Vec<Settings>,
-    future: Vec<Settings>,
+    past: Vec<Step>,
+    future: Vec<Step>,
     last: Option<Gesture>,
+    /// Number of steps so far, those back and forth included.
+    steps: u64,
 }
 
 /// A change that may go on.
 struct Gesture {
-    /// Paths of the settings that it changes.
-    paths: Vec<String>,
+    /// What it changes: paths of settings, or a device.
+    of: Vec<String>,
     at: Instant,
 }
 
 impl History {
-    /// Notes the settings before a change of those at `paths`.
-    pub(super) fn push(&mut self, before: Settings, paths: Vec<String>, now: Instant) {
-        let last = self.last.as_ref();
-        let goes_on = last.is_some_and(|last| now - last.at < GESTURE && last.paths == paths);
-        self.last = Some(Gesture { paths, at: now });
+    /// Notes what was before a change of all that `of` names; of nothing, the change is a step of its own.
+    pub(super) fn push(&mut self, before: Step, of: Vec<String>, now: Instant) {
+        self.steps += 1;
+        let last = self.last.as_ref().filter(|_| !of.is_empty());
+        let goes_on = last.is_some_and(|last| now - last.at < GESTURE && last.of == of);
+        self.last = Some(Gesture { of, at: now });
         self.future.clear();
         if goes_on && !self.past.is_empty() {
             return;
@@ -45,22 +65,109 @@ impl History {
         self.last = None;
     }
 
-    pub(super) fn undo(&mut self, present: Settings) -> Option<Settings> {
-        let before = self.past.pop()?;
-        self.future.push(present);
+    /// Forgets the steps of the settings: they are those of other anatomy.
+    pub(super) fn forget_settings(&mut self) {
         self.last = None;
-        Some(before)
+        for steps in [&mut self.past, &mut self.future] {
+            steps.retain(|step| !matches!(step, Step::Settings(_)));
+        }
+    }
+}
+
+impl Model {
+    /// Notes that the settings were `before` until now.
+    pub fn note(&mut self, before: &Settings, now: Instant) {
+        if *before != self.settings {
+            self.unite(before);
+            self.carry_skin(before);
+            let (origins, lattice) = (&self.file.origins, self.file.lattice);
+            let changes = entries::changes(before, &self.settings, origins, lattice);
+            let paths = changes.into_iter().map(|(path, _)| path).collect();
+            self.history.push(Step::Settings(Box::new(before.clone())), paths, now);
+            self.touch(now);
+        }
     }
 
-    pub(super) fn redo(&mut self, present: Settings) -> Option<Settings> {
-        let after = self.future.pop()?;
-        self.past.push(present);
-        self.last = None;
-        Some(after)
+    /// Notes that marks were made, moved or removed; not before a drag or a text has ended.
+    pub fn note_marks(&mut self, now: Instant) {
+        if self.sheet.is_busy() || self.sheet.marks() == self.noted_marks {
+            return;
+        }
+        let marks = self.sheet.marks().to_vec();
+        // Keys move a point by a pixel at a time.
+        let moved = marks.len() == self.noted_marks.len();
+        let of = moved.then(|| "marks".to_owned()).into_iter().collect();
+        let before = std::mem::replace(&mut self.noted_marks, marks);
+        self.history.push(Step::Marks(before), of, now);
     }
 
-    /// Numbers of steps back and forward.
-    pub(super) fn depth(&self) -> [usize; 2] {
-        [self.past.len(), self.future.len()]
+    /// Notes that `source` is about to move the probe.
+    pub(super) fn note_pose(&mut self, source: Source, now: Instant) {
+        let of = vec![format!("pose by {}", source.name())];
+        self.history.push(Step::Pose(self.pose), of, now);
+    }
+
+    /// Takes another trajectory; the one before comes back by undo.
+    pub fn keep_trajectory(&mut self, stored: StoredTrajectory, now: Instant) {
+        let before = self.trajectory.stored.replace(stored);
+        self.history.push(Step::Trajectory(before), Vec::new(), now);
+    }
+
+    /// Goes back by one change, if there is one.
+    pub fn undo(&mut self, now: Instant) {
+        if let Some(step) = self.history.past.pop() {
+            let undone = self.put(step, now);
+            self.history.future.push(undone);
+        }
+    }
+
+    /// Goes forward again.
+    pub fn redo(&mut self, now: Instant) {
+        if let Some(step) = self.history.future.pop() {
+            let before = self.put(step, now);
+            self.history.past.push(before);
+        }
+    }
+
+    /// Number that grows with every step, those back and forth included.
+    pub fn steps(&self) -> u64 {
+        self.history.steps
+    }
+
+    /// Returns whether there is something to undo, and to redo.
+    pub fn undoable(&self) -> [bool; 2] {
+        [!self.history.past.is_empty(), !self.history.future.is_empty()]
+    }
+
+    /// Puts what a step holds in the place of what there is, which is returned.
+    fn put(&mut self, step: Step, now: Instant) -> Step {
+        self.history.steps += 1;
+        self.history.end_gesture();
+        match step {
+            Step::Settings(settings) => {
+                let before = std::mem::replace(&mut self.settings, *settings);
+                self.carry_skin(&before);
+                self.touch(now);
+                Step::Settings(Box::new(before))
+            }
+            Step::Pose(pose) => {
+                self.stop(now);
+                let before = self.pose;
+                // A tracker that lies still does not take the probe back.
+                self.devices.take(Source::Keyboard);
+                self.settle("undo", pose, now);
+                Step::Pose(before)
+            }
+            Step::Poses(poses) => Step::Poses(std::mem::replace(&mut self.poses, poses)),
+            Step::Marks(marks) => {
+                self.noted_marks.clone_from(&marks);
+                Step::Marks(self.sheet.put(marks))
+            }
+            Step::Trajectory(stored) => {
+                self.stop(now);
+                self.touch(now);
+                Step::Trajectory(std::mem::replace(&mut self.trajectory.stored, stored))
+            }
+        }
     }
 }

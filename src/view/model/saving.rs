@@ -41,15 +41,19 @@ impl File {
 }
 
 impl Model {
-    /// Returns whether settings differ from those of the file; `with_pose`: or the pose does.
+    /// Returns whether settings or named poses differ from those of the file; `with_pose`: or the pose does.
     pub fn is_modified(&self, with_pose: bool) -> bool {
         let as_now = |tracer| Settings { tracer, ..self.loaded.clone() };
-        as_now(self.settings.tracer) != self.settings || (with_pose && self.pose != self.home)
+        as_now(self.settings.tracer) != self.settings
+            || self.has_other_poses()
+            || (with_pose && self.pose != self.home)
     }
 
-    /// Entries that make the file give the settings, `with_pose` also the pose of the probe.
-    fn changes(&self, with_pose: bool) -> Vec<Entry> {
-        self.entries(&self.settings, with_pose.then_some(&self.pose))
+    /// Entries that make the file give the settings and the named poses, `with_pose` also the pose of the probe.
+    pub fn changes(&self, with_pose: bool) -> Vec<Entry> {
+        let mut out = self.entries(&self.settings, with_pose.then_some(&self.pose));
+        out.extend(self.pose_entries());
+        out
     }
 
     /// Entries that make the file give `settings`, which this session once had, and a pose of the probe:
@@ -83,7 +87,9 @@ impl Model {
         }
         self.file.path = to;
         self.file.overrides.clear();
+        self.saves += 1;
         self.loaded = self.settings.clone();
+        self.poses_are_filed();
         if with_pose {
             self.home = self.pose;
         }

@@ -1,6 +1,7 @@
 //! The marks on the image, measurements and texts: the pointer makes, moves and removes them.
 
 use glam::{DAffine3, DVec2};
+use serde::{Deserialize, Serialize};
 
 use super::calipers::{Caliper, Kind};
 
@@ -14,7 +15,7 @@ pub enum Tool {
 }
 
 /// A text on the image.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Note {
     /// The text.
     pub text: String,
@@ -25,7 +26,7 @@ pub struct Note {
 }
 
 /// The pose and the time of an image.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Moment {
     /// World from probe.
     pub pose: DAffine3,
@@ -34,7 +35,7 @@ pub struct Moment {
 }
 
 /// Content of a mark.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum What {
     /// A measurement.
     Caliper(Caliper),
@@ -43,7 +44,7 @@ pub enum What {
 }
 
 /// A measurement or text, with the image on which it was put.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Mark {
     /// Its letter, `A` to `Z`.
     pub letter: char,
@@ -71,6 +72,11 @@ impl Mark {
     }
 }
 
+/// The tool whose points are as many as the user likes.
+const TRACE: Tool = Tool::Measure(Kind::Trace);
+/// Most points of an outline.
+const MOST: usize = 4096;
+
 /// A point of a mark: both indices.
 pub type Handle = (usize, usize);
 
@@ -95,6 +101,10 @@ pub struct Sheet {
     selected: Option<Handle>,
     /// Vector from the pointer to the selected point that follows it, mm.
     held: Option<DVec2>,
+    /// Least distance between points of an outline that is drawn with the button held, mm.
+    tracing: Option<f64>,
+    /// True once such a point was added.
+    drawn: bool,
     editing: Option<usize>,
 }
 
@@ -102,6 +112,17 @@ impl Sheet {
     /// All marks, in the order of their making.
     pub fn marks(&self) -> &[Mark] {
         &self.marks
+    }
+
+    /// Puts other marks in the place of these, which are returned; the tool stays.
+    pub fn put(&mut self, marks: Vec<Mark>) -> Vec<Mark> {
+        let tool = self.tool;
+        std::mem::replace(self, Self { tool, marks, ..Self::default() }).marks
+    }
+
+    /// Returns whether a mark is being dragged or its text typed.
+    pub fn is_busy(&self) -> bool {
+        self.held.is_some() || self.editing.is_some()
     }
 
     /// The pointer's tool.
@@ -113,6 +134,7 @@ impl Sheet {
     pub fn take(&mut self, tool: Option<Tool>) {
         self.tool = tool;
         self.draft = None;
+        (self.tracing, self.drawn) = (None, false);
         self.stop_editing();
     }
 
@@ -167,7 +189,15 @@ impl Sheet {
     pub fn press(&mut self, at: DVec2, reach: f64, of: Moment) {
         self.stop_editing();
         self.pointer = at;
-        if self.draft.is_some() {
+        if let Some(draft) = &self.draft {
+            if draft.tool == TRACE {
+                // Back at its beginning, or twice at one place: the outline is closed.
+                let ends = [draft.points[0], draft.points[draft.points.len() - 1]];
+                if ends.iter().any(|end| end.distance(at) <= reach) {
+                    return self.close();
+                }
+                self.tracing = Some(reach / 2.0);
+            }
             return self.add(at);
         }
         self.deselect();
@@ -176,6 +206,7 @@ impl Sheet {
         } else if let Some(tool) = self.tool {
             let points = vec![at];
             self.draft = Some(Draft { tool, points, of });
+            self.tracing = (tool == TRACE).then_some(reach / 2.0);
         }
     }
 
@@ -185,6 +216,13 @@ impl Sheet {
         if let (Some(apart), Some((mark, point))) = (self.held, self.selected) {
             self.marks[mark].drag(point, at + apart);
         }
+        if let (Some(step), Some(draft)) = (self.tracing, &mut self.draft)
+            && draft.points[draft.points.len() - 1].distance(at) > step
+            && draft.points.len() < MOST
+        {
+            draft.points.push(at);
+            self.drawn = true;
+        }
     }
 
     /// Handles the button going up: a point where it went down and another one here, if the pointer moved
@@ -192,7 +230,15 @@ impl Sheet {
     pub fn release(&mut self, at: DVec2, reach: f64) {
         self.motion(at);
         self.held = None;
+        self.tracing = None;
         let Some(draft) = &self.draft else { return };
+        if draft.tool == TRACE {
+            // A stroke is an outline; a click is one point of it.
+            if std::mem::take(&mut self.drawn) {
+                self.close();
+            }
+            return;
+        }
         let last = *draft.points.last().expect("the first point made it");
         if draft.tool == Tool::Note || last.distance(at) > reach {
             self.add(at);
@@ -203,7 +249,9 @@ impl Sheet {
         let Some(draft) = &mut self.draft else { return };
         draft.points.push(at);
         let what = match draft.tool {
-            Tool::Measure(kind) if draft.points.len() < kind.points() => return,
+            Tool::Measure(kind) if kind.points().is_none_or(|all| draft.points.len() < all) => {
+                return;
+            }
             Tool::Measure(kind) => What::Caliper(Caliper::new(kind, draft.points.clone())),
             Tool::Note => {
                 let tip = draft.points[0];
@@ -214,9 +262,26 @@ impl Sheet {
                 What::Note(Note { text, at, arrow })
             }
         };
-        let (of, letter) = (draft.of, self.letter());
-        self.draft = None;
-        self.marks.push(Mark { letter, what, of });
+        self.finish(what);
+    }
+
+    /// Closes the outline that is being traced; drops one that encloses nothing.
+    pub fn close(&mut self) {
+        let traced = self.draft.as_ref().filter(|draft| draft.tool == TRACE);
+        let Some(points) = traced.map(|draft| draft.points.clone()) else {
+            return;
+        };
+        match points.len() < 3 {
+            true => self.draft = None,
+            false => self.finish(What::Caliper(Caliper::new(Kind::Trace, points))),
+        }
+    }
+
+    /// Puts what was drafted among the marks.
+    fn finish(&mut self, what: What) {
+        let Some(draft) = self.draft.take() else { return };
+        let letter = self.letter();
+        self.marks.push(Mark { letter, what, of: draft.of });
         self.select(self.marks.len() - 1);
     }
 
@@ -279,8 +344,7 @@ impl Sheet {
 
     /// Removes all marks.
     pub fn clear(&mut self) {
-        let tool = self.tool;
-        *self = Self { tool, ..Self::default() };
+        self.put(Vec::new());
     }
 
     /// Names a measurement, or sets the text of a note.

@@ -1,44 +1,9 @@
 //! The text beside a saved picture: pose, time, settings and measurements.
 
-use glam::DAffine3;
 use serde_json::{Map, Value, json};
 
 use super::calipers::Reading;
 use super::sheet::{Mark, Moment, What};
-
-/// Place of a picture in the image plane.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Area {
-    /// Width and height in pixels.
-    pub size: [u32; 2],
-    /// Edge of a pixel, mm.
-    pub pitch: f64,
-    /// Lateral place of the left edge and depth of the upper edge, mm.
-    pub corner: [f64; 2],
-}
-
-/// Size and place of a picture.
-pub fn image(area: &Area) -> Value {
-    json!({
-        "width": area.size[0],
-        "height": area.size[1],
-        "pixel_pitch_mm": area.pitch,
-        "left_mm": area.corner[0],
-        "top_mm": area.corner[1],
-    })
-}
-
-/// The probe's axes and the centre of its face in the world.
-pub fn pose(world_from_probe: &DAffine3) -> Value {
-    let m = world_from_probe.matrix3;
-    let place = world_from_probe.translation;
-    json!({
-        "position_mm": place.to_array(),
-        "lateral": m.x_axis.to_array(),
-        "elevation": m.y_axis.to_array(),
-        "depth": m.z_axis.to_array(),
-    })
-}
 
 /// Measurements and texts on the picture of a moment, under the keys `measurements` and `texts`. Each
 /// says whether it was put on this picture or on another one.
@@ -83,6 +48,9 @@ fn values(reading: &Reading) -> Map<String, Value> {
             ("area_mm2", json!(area)),
         ],
         Reading::Angle(degrees) => vec![("angle_deg", json!(degrees))],
+        Reading::Trace { circumference, area } => {
+            vec![("circumference_mm", json!(circumference)), ("area_mm2", json!(area))]
+        }
     };
     pairs.into_iter().map(|(key, value)| (key.into(), value)).collect()
 }
@@ -107,7 +75,8 @@ mod tests {
 
     use super::super::calipers::{Caliper, Kind};
     use super::super::sheet::{Mark, Moment, Note, What};
-    use super::{marks, pose, stem};
+    use super::{marks, stem};
+    use crate::sim::facts::pose;
 
     #[test]
     fn names_of_files_are_plain() {

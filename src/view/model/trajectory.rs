@@ -8,6 +8,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use glam::{DAffine3, DQuat, DVec3};
+use serde::{Deserialize, Serialize};
 
 use super::Clock;
 use crate::scene::animation::{Channel, Curve, Track, Trs};
@@ -18,7 +19,7 @@ const REST: Duration = Duration::from_millis(100);
 const ROWS: usize = 200_000;
 
 /// The probe's pose at a moment.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Row {
     /// Time since the recording began, s.
     seconds: f64,
@@ -100,7 +101,7 @@ impl Recorder {
 }
 
 /// A recorded trajectory of the probe.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Recording {
     scene_seconds: f64,
     rows: Vec<Row>,

@@ -43,6 +43,16 @@ impl StoredTrajectory {
         Self { track: Arc::new(track), unsaved: None, name, scene_seconds: None }
     }
 
+    /// A trajectory that has just been recorded.
+    pub fn recorded(recording: Recording) -> Self {
+        Self {
+            track: Arc::new(recording.track()),
+            scene_seconds: Some(recording.scene_seconds()),
+            name: "recorded".to_owned(),
+            unsaved: Some(recording),
+        }
+    }
+
     /// Its length, s.
     pub fn seconds(&self) -> f64 {
         let (first, last) = self.track.span().unwrap_or_default();
@@ -51,6 +61,11 @@ impl StoredTrajectory {
 }
 
 impl Model {
+    /// The recorded trajectory that no file holds yet.
+    pub fn unsaved_trajectory(&self) -> Option<&StoredTrajectory> {
+        self.trajectory.stored.as_ref().filter(|stored| stored.unsaved.is_some())
+    }
+
     /// Begins a recording, or ends it.
     pub fn record(&mut self, now: Instant) {
         let scene = self.clock.at(now);
@@ -58,12 +73,7 @@ impl Model {
             None => self.trajectory.recorder = Some(Recorder::new(self.pose, scene, now)),
             Some(recorder) => {
                 let recording = recorder.finish(now);
-                self.trajectory.stored = Some(StoredTrajectory {
-                    track: Arc::new(recording.track()),
-                    scene_seconds: Some(recording.scene_seconds()),
-                    name: "recorded".to_owned(),
-                    unsaved: Some(recording),
-                });
+                self.keep_trajectory(StoredTrajectory::recorded(recording), now);
             }
         }
     }
@@ -83,6 +93,7 @@ impl Model {
             self.clock.play(true, now);
         }
         let (track, looped) = (stored.track.clone(), self.trajectory.looped);
+        self.note_pose(Source::Replay, now);
         let mut replay = Replay::new(track, &self.home, start, looped, now);
         replay.hold(self.frozen, now);
         self.trajectory.replay = Some(replay);

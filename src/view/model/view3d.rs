@@ -92,6 +92,16 @@ impl View3d {
         }
     }
 
+    /// Takes over camera, cut and what is shown from the view of the scene before it was read again.
+    pub(super) fn resume(&mut self, old: &Self) {
+        (self.camera, self.cut) = (old.camera, old.cut);
+        for tissue in &mut self.shown {
+            if let Some(before) = old.shown.iter().find(|before| before.name == tissue.name) {
+                (tissue.show, tissue.otherwise) = (before.show, before.otherwise);
+            }
+        }
+    }
+
     /// Moves the camera back to the view of probe and fan from the side.
     pub fn reset(&mut self, pose: &DAffine3, probe: &Probe) {
         self.camera = overview(pose, probe);

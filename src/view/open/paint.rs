@@ -9,7 +9,7 @@ use crate::view::layout::{self, Places};
 use crate::view::statistics::{Sample, Times};
 use crate::view::timing::costs;
 use crate::view::tools::cropped;
-use crate::view::{keys, real};
+use crate::view::{keys, mmode, real};
 
 /// Number of images of an animation after which a screenshot is taken.
 const SETTLED: usize = 24;
@@ -34,6 +34,7 @@ impl Open {
                 shown = state.tools.shown(model, ui.ctx());
                 let pictures = (shown.as_ref(), pictured);
                 places = layout::show(ui, model, state, times, pictures, touched);
+                model.note_marks(touched);
             }));
         }
         self.tell();
@@ -47,14 +48,18 @@ impl Open {
         let image = shown.as_ref().map(|frame| real::image(frame, model));
         let view3d = self.pictured.as_ref().map(|pictured| &pictured.image);
         let rects = [
-            (image, places.image.as_ref().map(|place| place.rect)),
-            (view3d, places.view3d.map(|place| place.rect)),
+            (image, places.image.as_ref().map(|place| (place.rect, place.room, place.flipped))),
+            (view3d, places.view3d.map(|place| (place.rect, place.rect, [false; 2]))),
         ];
         let placed: Vec<PlacedImage> = (rects.into_iter())
             .filter_map(|(image, rect)| {
-                let r = rect? * scale;
-                let to = [r.left(), r.top(), r.right(), r.bottom()];
-                Some(PlacedImage { image: image?, to })
+                let (rect, room, flipped) = rect?;
+                let sides = |r: egui::Rect| {
+                    let r = r * scale;
+                    [r.left(), r.top(), r.right(), r.bottom()]
+                };
+                let (to, within) = (sides(rect), sides(room));
+                Some(PlacedImage { image: image?, to, within, flipped })
             })
             .collect();
         let size = self.window.inner_size();
@@ -73,7 +78,8 @@ impl Open {
         let size = [size.width, size.height];
         let painter = &mut self.session.painter;
         let tools = &mut self.state.tools;
-        let marked = tools.wants_shot() && painter.can_be_read();
+        let wanted = tools.wants_shot(&self.model) && painter.can_be_read();
+        let marked = wanted && tools.cleared;
         let painted = painter.paint(size, &placed, interface, shot || marked)?;
         self.session.engine.drawn();
         let picture = match &painted {
@@ -84,7 +90,12 @@ impl Open {
             let r = place.area * scale;
             cropped(picture, [r.left(), r.top(), r.right(), r.bottom()])
         });
-        tools.save(&self.model, around);
+        let strip = || mmode::saved(&self.model, &self.state.mmode);
+        // Asked for while it was drawn: the next drawing is the one without buttons.
+        match wanted && !marked {
+            true => context.request_repaint(),
+            false => tools.save(&self.model, around, strip),
+        }
         self.painted = (began, began.elapsed());
         self.schedule(&output);
         match painted {

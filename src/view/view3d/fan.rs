@@ -38,7 +38,7 @@ pub(super) fn show(painter: &Painter, place: &Place, pictured: &Pictured, wires:
 
 /// The image's border in the probe's space, mm, from the last scanline's start around to the first's:
 /// the face itself belongs to the probe.
-pub(super) fn outline(probe: &Probe) -> Vec<DVec3> {
+pub(in crate::view) fn outline(probe: &Probe) -> Vec<DVec3> {
     let fan = |radius: f64, field_of_view: f64| {
         let along = |i: u32| field_of_view * (f64::from(i) / f64::from(ARC) - 0.5);
         let point = |r: f64, angle: f64| DVec3::new(r * angle.sin(), 0.0, r * angle.cos() - radius);

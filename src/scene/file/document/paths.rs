@@ -10,7 +10,7 @@ use toml_edit::Key;
 use crate::settings::suggest;
 
 /// Tables of which a file may have several.
-pub const LISTS: [&str; 5] = ["group", "transform", "selector", "mesh", "wire"];
+pub const LISTS: [&str; 7] = ["pose", "task", "group", "transform", "selector", "mesh", "wire"];
 
 /// The value at a path of keys and indices.
 pub fn find<'a, 's>(root: &'a DeTable<'s>, path: &[&str]) -> Option<&'a Spanned<DeValue<'s>>> {
@@ -53,16 +53,28 @@ pub fn insert<'s>(
     value: Spanned<DeValue<'s>>,
     key_span: &Range<usize>,
 ) -> Result<(), Misfit> {
+    if let [first, name, ..] = path
+        && LISTS.contains(first)
+        && !table.contains_key(*first)
+    {
+        let message = format!("there is no {first} `{name}`: the file has no [[{first}]]");
+        return Err((message, format!("add a [[{first}]] to the file")));
+    }
+    into_table(table, path, value, key_span)
+}
+
+fn into_table<'s>(
+    table: &mut DeTable<'s>,
+    path: &[&'s str],
+    value: Spanned<DeValue<'s>>,
+    key_span: &Range<usize>,
+) -> Result<(), Misfit> {
     let (first, rest) = path.split_first().expect("a path has a part");
     if rest.is_empty() {
         table.insert(Spanned::new(key_span.clone(), Cow::Borrowed(*first)), value);
         return Ok(());
     }
     if !table.contains_key(*first) {
-        if LISTS.contains(first) {
-            let message = format!("there is no {first} `{}`: the file has no [[{first}]]", rest[0]);
-            return Err((message, format!("add a [[{first}]] to the file")));
-        }
         let empty = DeValue::Table(DeTable::new());
         let key = Spanned::new(key_span.clone(), Cow::Borrowed(*first));
         table.insert(key, Spanned::new(key_span.clone(), empty));
@@ -79,7 +91,7 @@ fn into_value<'s>(
     key_span: &Range<usize>,
 ) -> Result<(), Misfit> {
     let array = match target {
-        DeValue::Table(table) => return insert(table, rest, value, key_span),
+        DeValue::Table(table) => return into_table(table, rest, value, key_span),
         DeValue::Array(array) => array,
         _ => {
             return Err((format!("`{name}` has no parts"), "set it as a whole".to_owned()));

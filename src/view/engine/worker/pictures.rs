@@ -8,7 +8,7 @@ use super::{Imaged, Taken, Worker};
 use crate::gpu::Abandon;
 use crate::scene::Scene;
 use crate::sim::{SimError, Simulator, Tracer, image_size};
-use crate::view::engine::{Frame, News, Pixels, Sector};
+use crate::view::engine::{Film, Frame, News, Pixels, Sector};
 use crate::view::look::Pictured;
 use crate::view::model::{Order, Settings};
 
@@ -74,7 +74,7 @@ impl Worker {
     }
 
     /// Uploads the scene where it is not loaded, and makes room for the scene's own counts.
-    fn prepare<'s>(
+    pub(super) fn prepare<'s>(
         &mut self,
         simulator: &'s mut Option<(Simulator, Tracer)>,
         settings: &Settings,
@@ -102,18 +102,24 @@ impl Worker {
         Ok((simulator, fitted))
     }
 
-    /// Makes the picture of an image; also its pixels, if they are wanted.
+    /// Gives the scene the settings of an order, and what its pictures need.
+    pub(super) fn adapt(&mut self, order: &Order) {
+        order.settings.apply(&mut self.scene);
+        self.scene.simulation.labels |= order.paint.is_some();
+    }
+
+    /// Makes the picture of an image. The M-mode strip gets `film` with it, or the pixels.
     pub(super) fn carry_out(
         &mut self,
         simulator: &mut Option<(Simulator, Tracer)>,
         taken: &Taken,
-    ) -> Result<(Frame, Option<Pixels>), SimError> {
+        film: Option<Film>,
+    ) -> Result<(Frame, Film), SimError> {
         #[cfg(debug_assertions)]
         die_where_asked();
         let began = Instant::now();
         let (order, pose, seconds) = (&taken.order, taken.pose, taken.seconds);
-        order.settings.apply(&mut self.scene);
-        self.scene.simulation.labels |= order.paint.is_some();
+        self.adapt(order);
         self.scene.world_from_probe = pose;
         let at_rest = taken.level.is_some();
         if !at_rest {
@@ -158,20 +164,22 @@ impl Worker {
         if self.left.is_some() {
             self.pace.finished(level, (wall - prepared).as_secs_f64() * 1e3);
         }
-        let pixels = match order.reads_back {
-            true => {
+        let film = match film {
+            Some(film) => film,
+            None => {
                 let (width, height, rgba) = simulator.pixels()?;
-                let size = [width, height];
-                Some(Pixels { size, rgba })
+                Film::Picture(Pixels { size: [width, height], rgba })
             }
-            false => None,
         };
         self.left = Some(Imaged { order: order.clone(), index: taken.index, pose, seconds, level });
         let mut state = self.shared.state.lock();
         state.looks_new = state.look.is_some();
         drop(state);
         let constants = simulator.constants();
-        let rgba = pixels.as_ref().map(|pixels| pixels.rgba.as_slice());
+        let rgba = match &film {
+            Film::Picture(pixels) => Some(pixels.rgba.as_slice()),
+            _ => None,
+        };
         self.broadcast.offer(&image, rgba, constants, pose)?;
         let frame = Frame {
             sector: Sector {
@@ -198,7 +206,7 @@ impl Worker {
             scene_memory: simulator.memory(),
             image_bytes: self.ring.bytes(),
         };
-        Ok((frame, pixels))
+        Ok((frame, film))
     }
 }
 

@@ -128,3 +128,43 @@ fn a_text_is_placed_by_a_click_and_points_after_a_drag() {
     sheet.take(None);
     assert!(sheet.marks().is_empty());
 }
+
+#[test]
+fn an_outline_is_drawn_in_one_stroke_or_clicked_and_closed_at_its_beginning() {
+    let mut sheet = Sheet::default();
+    sheet.take(Some(Tool::Measure(Kind::Trace)));
+    sheet.press(dvec2(0.0, 10.0), REACH, NOW);
+    for (x, z) in [(10.0, 10.0), (10.1, 10.0), (10.0, 20.0), (0.0, 20.0)] {
+        sheet.motion(dvec2(x, z));
+    }
+    sheet.release(dvec2(0.0, 20.0), REACH);
+    for (x, z) in [(0.0, 30.0), (6.0, 30.0), (6.0, 38.0), (0.2, 30.1)] {
+        click(&mut sheet, x, z);
+    }
+    // Twice at one place.
+    for (x, z) in [(0.0, 50.0), (3.0, 50.0), (3.0, 54.0), (3.0, 54.0)] {
+        click(&mut sheet, x, z);
+    }
+    // A line encloses nothing.
+    for (x, z) in [(0.0, 60.0), (5.0, 60.0), (5.0, 60.0)] {
+        click(&mut sheet, x, z);
+    }
+    let areas: Vec<f64> = (sheet.marks().iter())
+        .map(|mark| match &mark.what {
+            What::Caliper(caliper) => match caliper.reading() {
+                Reading::Trace { area, .. } => area,
+                other => panic!("{other:?}"),
+            },
+            What::Note(note) => panic!("{note:?}"),
+        })
+        .collect();
+    assert_eq!(areas, [100.0, 24.0, 6.0]);
+    assert!(!sheet.is_drawing());
+    // The tool put away in the middle leaves nothing behind.
+    sheet.press(dvec2(0.0, 70.0), REACH, NOW);
+    sheet.motion(dvec2(9.0, 70.0));
+    sheet.take(Some(Tool::Measure(Kind::Distance)));
+    sheet.motion(dvec2(9.0, 79.0));
+    drag(&mut sheet, [0.0, 80.0], [3.0, 84.0]);
+    assert_eq!(distance(&sheet, 3), 5.0);
+}

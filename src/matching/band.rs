@@ -1,4 +1,4 @@
-//! The samples of the scanlines near the mask's border, by side.
+//! The samples of the scanlines around the mask.
 
 use crate::probe::Probe;
 use crate::scene::{Acquired, Scene};
@@ -11,10 +11,9 @@ const LEAST_ECHOING: f64 = 0.5;
 /// Half the edge of the square around a sample in which it is judged, mm.
 const HALF_WINDOW: f64 = 1.0;
 
-/// Places of the samples, [L][K].
-pub(super) struct Bands {
-    /// Distance from the mask's border in the image, mm: negative inside the mask. NaN where a sample
-    /// lies outside the image or the image shows one side only.
+/// Samples around the mask, [L][K].
+pub(super) struct Band {
+    /// Distance from the mask's border in the image, mm, of samples that belong to the band; NaN of others.
     distance: Vec<f32>,
     /// True where the acquired volume has a value.
     acquired: Vec<bool>,
@@ -22,20 +21,25 @@ pub(super) struct Bands {
     samples: usize,
 }
 
-impl Bands {
-    /// Places of the samples of `scene`, whose last frame was `frame` with the intermediate `steps`.
-    pub fn new(scene: &Scene, acquired: &Acquired, frame: &Frame, steps: &FusionSteps) -> Self {
+impl Band {
+    /// The samples of `scene` up to `width` mm outside its mask, whose last frame was `frame` with the
+    /// intermediate `steps`. Those behind the mask do not belong to it: the sound of the simulation has gone
+    /// through what is inside the mask, that of the volume through something else.
+    pub fn new(
+        scene: &Scene,
+        acquired: &Acquired,
+        frame: &Frame,
+        steps: &FusionSteps,
+        width: f64,
+    ) -> Self {
         let probe = &scene.probe;
         let (lines, samples) = (probe.scanlines as usize, probe.samples as usize);
-        let (width, height) = (frame.image_width as usize, frame.image_height as usize);
-        let shown = |i: usize| steps.simulated[4 * i + 3] > 0;
-        let to = |inside: bool| {
-            let wanted = |i: usize| shown(i) && (steps.mask[i] < 0.5) == inside;
-            squared_distances(width, height, wanted)
-        };
-        let (to_inside, to_outside) = (to(true), to(false));
+        let (columns, rows) = (frame.image_width as usize, frame.image_height as usize);
+        // 1 is the volume, 0 the simulation.
+        let masked = |i: usize| steps.simulated[4 * i + 3] > 0 && steps.mask[i] < 0.5;
+        let to_mask = squared_distances(columns, rows, masked);
         let voxel_from_probe = acquired.world_from_voxel.inverse() * scene.world_from_probe;
-        let mut bands = Self {
+        let mut band = Self {
             distance: vec![f32::NAN; lines * samples],
             acquired: vec![false; lines * samples],
             lines,
@@ -46,50 +50,61 @@ impl Bands {
             origin.y = 0.0;
             for k in 0..samples {
                 let at = l * samples + k;
+                if steps.prescan[2 * at] < 0.5 {
+                    break;
+                }
                 let p = origin + k as f64 * probe.sample_pitch() * direction;
                 let v = voxel_from_probe.transform_point3(p).to_array();
                 let within = |(x, n): (&f64, &usize)| (-0.5..=*n as f64 - 0.5).contains(x);
-                bands.acquired[at] = v.iter().zip(&acquired.size).all(within);
+                band.acquired[at] = v.iter().zip(&acquired.size).all(within);
                 let pitch = f64::from(frame.pixel_pitch);
                 let column = (p.x - f64::from(frame.image_left)) / pitch;
                 let row = (p.z - f64::from(frame.image_top)) / pitch;
-                if !(0.0..width as f64).contains(&column) || !(0.0..height as f64).contains(&row) {
+                if !(0.0..columns as f64).contains(&column) || !(0.0..rows as f64).contains(&row) {
                     continue;
                 }
-                let pixel = row as usize * width + column as usize;
+                let pixel = row as usize * columns + column as usize;
                 // Half a pixel lies between the border and the pixels beside it.
-                let distance = |squared: f64| ((squared.sqrt() - 0.5) * pitch) as f32;
-                let signed = match steps.prescan[2 * at] > 0.5 {
-                    true => distance(to_inside[pixel]),
-                    false => -distance(to_outside[pixel]),
-                };
-                bands.distance[at] = if signed.is_finite() { signed } else { f32::NAN };
+                let distance = (to_mask[pixel].sqrt() - 0.5) * pitch;
+                if distance > 0.0 && distance <= width {
+                    band.distance[at] = distance as f32;
+                }
             }
         }
-        bands
+        band
     }
 
-    /// Samples outside the mask up to `width` mm from its border, whether acquired or not.
-    pub fn outside(&self, width: f64) -> Vec<bool> {
-        let near = |&d: &f32| d > 0.0 && f64::from(d) <= width;
-        self.distance.iter().map(near).collect()
+    /// True if no sample belongs to it.
+    pub fn is_empty(&self) -> bool {
+        self.distance.iter().all(|d| d.is_nan())
+    }
+
+    /// Those of `values`, one for each sample, that belong to the band.
+    pub fn of<'v, T>(&self, values: &'v [T]) -> impl Iterator<Item = &'v T> {
+        let all = self.distance.iter().zip(values);
+        all.filter(|(d, _)| !d.is_nan()).map(|(_, value)| value)
+    }
+
+    /// Removes the samples of which `wanted` is false.
+    pub fn keep(&mut self, wanted: impl Fn(usize) -> bool) {
+        for (at, distance) in self.distance.iter_mut().enumerate() {
+            if !wanted(at) {
+                *distance = f32::NAN;
+            }
+        }
     }
 
     /// Removes the samples that were not acquired.
-    pub fn keep_acquired(&self, chosen: &mut [bool]) {
-        for (chosen, &acquired) in chosen.iter_mut().zip(&self.acquired) {
-            *chosen &= acquired;
-        }
+    pub fn keep_acquired(&mut self) {
+        let acquired = std::mem::take(&mut self.acquired);
+        self.keep(|at| acquired[at]);
     }
 
-    /// Samples inside the mask, from `margin` of the row to `width` mm from its border.
-    pub fn inside(&self, width: f64, margin: impl Fn(usize) -> f64) -> Vec<bool> {
+    /// True for samples of the band that are farther than `margin` of their row from the mask's border.
+    pub fn chosen(&self, margin: impl Fn(usize) -> f64) -> Vec<bool> {
         let margins: Vec<f64> = (0..self.samples).map(margin).collect();
-        let near = |(i, &d): (usize, &f32)| {
-            let depth = -f64::from(d);
-            depth >= margins[i % self.samples] && depth > 0.0 && depth <= width
-        };
-        self.distance.iter().enumerate().map(near).collect()
+        let far = |(i, &d): (usize, &f32)| f64::from(d) > margins[i % self.samples];
+        self.distance.iter().enumerate().map(far).collect()
     }
 
     /// Removes the samples around which most is black: `floor` of the row.

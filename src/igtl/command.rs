@@ -1,0 +1,169 @@
+//! Commands of clients, as COMMAND or STRING messages: settings, time, freezing, another scene. The program that has the
+//! server carries them out and answers; the client is told the error of a wrong one.
+
+use std::sync::Arc;
+
+use super::answer::respond;
+use super::client::{Answer, Client};
+use super::message::{Content, ExtendedHeader, Message};
+use super::wire::Label;
+use crate::settings::units::DURATION;
+
+/// Number of UTF-8 in the MIB of IANA.
+const UTF8: u16 = 106;
+
+/// What a client wants.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Order {
+    /// To give keys of the scene file other values: pairs as `--set` takes them.
+    Set(Vec<(String, String)>),
+    /// To be told the value of a key.
+    Get(String),
+    /// To set the scene's time, s.
+    Time(f64),
+    /// To stop the image, or to let it go on.
+    Freeze(bool),
+    /// To see another scene: a file, or the name of one that ships.
+    Scene(String),
+}
+
+/// An order that waits for its answer.
+pub struct Request {
+    /// What is wanted.
+    pub order: Order,
+    pub(super) client: Arc<Client>,
+    /// The message without its text.
+    pub(super) query: Message,
+}
+
+impl Order {
+    /// The order of a text: `PATH = VALUE` in lines, `get PATH`, `time = 1.5 s`, `freeze`, `unfreeze`, `scene = heart`.
+    ///
+    /// # Errors
+    /// A text that is none of these.
+    pub fn of(text: &str) -> Result<Self, String> {
+        let text = text.trim();
+        let parts = |line: &str| {
+            let (path, value) = line.split_once('=')?;
+            Some((path.trim().to_owned(), value.trim().to_owned()))
+        };
+        match (text, text.strip_prefix("get ")) {
+            ("freeze", _) => return Ok(Self::Freeze(true)),
+            ("unfreeze", _) => return Ok(Self::Freeze(false)),
+            (_, Some(path)) => return Ok(Self::Get(path.trim().to_owned())),
+            _ => {}
+        }
+        let lines = text.lines().filter(|line| !line.trim().is_empty());
+        let pairs: Option<Vec<_>> = lines.map(parts).collect();
+        match pairs.as_deref() {
+            Some([(path, value)]) if path == "time" => DURATION.finite(value).map(Self::Time),
+            Some([(path, value)]) if path == "scene" => {
+                Ok(Self::Scene(value.trim_matches('"').to_owned()))
+            }
+            Some([]) | None => Err(format!(
+                "`{}` is no command: write PATH = VALUE, get PATH, time = 1.5 s, freeze, unfreeze or scene = NAME",
+                text.chars().take(60).collect::<String>()
+            )),
+            Some(pairs) => Ok(Self::Set(pairs.to_vec())),
+        }
+    }
+
+    /// The order of a message; none of messages that carry none. The name of a COMMAND is a key where its text is but a
+    /// value, and the whole command where it has no text.
+    pub(super) fn of_message(content: &Content) -> Option<Result<Self, String>> {
+        let (name, text) = match content {
+            Content::String { text, .. } => (String::new(), text),
+            Content::Command { reply: false, name, text, .. } => (name.text().into_owned(), text),
+            _ => return None,
+        };
+        let text = String::from_utf8_lossy(text);
+        let text = text.trim_matches(['\0', ' ', '\n', '\r']);
+        let is_whole = name.is_empty() || name == "set" || text.contains('=');
+        Some(match (text.is_empty(), is_whole, &*name) {
+            (true, _, name) => Self::of(name),
+            (false, true, _) => Self::of(text),
+            (false, false, "get") => Ok(Self::Get(text.to_owned())),
+            (false, false, key) => Self::of(&format!("{key} = {text}")),
+        })
+    }
+}
+
+impl Request {
+    /// Tells the client what came of it: the text of a success, or the error.
+    pub fn answer(self, outcome: Result<String, String>) {
+        // A client that does not read its answers is ended by its own thread.
+        self.client.answer(Answer::Message(reply(&self.query, outcome)));
+    }
+}
+
+/// The message for the outcome of a command: RTS_COMMAND under its number, or a STRING. An error begins with `error: `.
+pub(super) fn reply(query: &Message, outcome: Result<String, String>) -> Vec<u8> {
+    let text = outcome.unwrap_or_else(|cause| format!("error: {cause}")).into_bytes();
+    let content = match &query.content {
+        Content::Command { id, name, .. } => {
+            Content::Command { reply: true, id: *id, name: *name, encoding: UTF8, text }
+        }
+        _ => Content::String { encoding: UTF8, text },
+    };
+    respond(query, content)
+}
+
+/// A command without its text, for the answer.
+pub(super) fn stub(message: &Message) -> Message {
+    let content = match &message.content {
+        Content::Command { id, name, encoding, .. } => Content::Command {
+            reply: false,
+            id: *id,
+            name: *name,
+            encoding: *encoding,
+            text: Vec::new(),
+        },
+        _ => Content::String { encoding: UTF8, text: Vec::new() },
+    };
+    let extension = message.extension.as_ref();
+    let extension = extension.map(|e| ExtendedHeader { id: e.id, metadata: Vec::new() });
+    Message { device: message.device, time: message.time, extension, content }
+}
+
+/// A COMMAND of this name and text, for clients.
+pub fn command(id: u32, name: &str, text: &str) -> Message {
+    let text = text.as_bytes().to_vec();
+    let name = Label::new(name);
+    Message::new("", Content::Command { reply: false, id, name, encoding: UTF8, text })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn texts_are_orders_or_refused() {
+        let pair = |path: &str, value: &str| (path.to_owned(), value.to_owned());
+        for (text, expected) in [
+            ("probe.depth = 80 mm", Order::Set(vec![pair("probe.depth", "80 mm")])),
+            ("a.b=1\n\n c.d = [1, 2]\n", Order::Set(vec![pair("a.b", "1"), pair("c.d", "[1, 2]")])),
+            ("get imaging.gain", Order::Get("imaging.gain".to_owned())),
+            ("time = 400 ms", Order::Time(0.4)),
+            ("scene = \"heart\"", Order::Scene("heart".to_owned())),
+            (" freeze\n", Order::Freeze(true)),
+            ("unfreeze", Order::Freeze(false)),
+        ] {
+            assert_eq!(Order::of(text), Ok(expected), "{text}");
+        }
+        for text in ["", "louder", "time = 4 mm", "a = 1\nlouder"] {
+            assert!(Order::of(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_command_may_say_its_key_in_its_name() {
+        let of = |name, text| Order::of_message(&command(1, name, text).content).expect("an order");
+        let set = Order::of("probe.depth = 80 mm");
+        assert_eq!(of("probe.depth", "80 mm"), set);
+        assert_eq!(of("set", "probe.depth = 80 mm"), set);
+        assert_eq!(of("", "probe.depth = 80 mm"), set);
+        assert_eq!(of("freeze", ""), Ok(Order::Freeze(true)));
+        assert_eq!(of("get", "imaging.gain"), Order::of("get imaging.gain"));
+        assert_eq!(of("time", "2 s\0"), Ok(Order::Time(2.0)));
+    }
+}

@@ -1,0 +1,111 @@
+//! Pictures of the scenes that ship, of which one can be opened.
+
+use std::time::Instant;
+
+use egui::{
+    Align2, Context, Id, Image, Key, RichText, Sense, TextureHandle, TextureOptions, Ui, vec2,
+};
+
+use super::leaving::{self, Way};
+use super::model::Model;
+use super::state::State;
+use super::{FIRST_STEPS, style};
+use crate::scene::shipped::{self, SCENES, Shipped};
+
+/// Room for one picture, points.
+const PICTURE: egui::Vec2 = vec2(190.0, 130.0);
+/// Pictures in a row.
+const COLUMNS: usize = 3;
+
+/// The gallery.
+pub(super) struct Gallery {
+    /// True while it is open.
+    pub(super) open: bool,
+    /// The reason why the last choice cannot be opened.
+    problem: Option<String>,
+}
+
+impl Gallery {
+    /// A gallery that is open or not.
+    pub(super) fn new(open: bool) -> Self {
+        Self { open, problem: None }
+    }
+}
+
+/// Draws the gallery if it is open; a click opens a scene, or asks first where something is not saved.
+pub(super) fn show(ctx: &Context, model: &mut Model, state: &mut State, now: Instant) {
+    let gallery = &mut state.gallery;
+    if !gallery.open {
+        return;
+    }
+    let mut open = !ctx.input(|input| input.key_pressed(Key::Escape));
+    let window = egui::Window::new("Scenes")
+        .anchor(Align2::CENTER_CENTER, [0.0, 0.0])
+        .resizable(false)
+        .collapsible(false)
+        .open(&mut open);
+    let chosen = window.show(ctx, |ui| {
+        let chosen = pictures(ui);
+        ui.separator();
+        for line in FIRST_STEPS {
+            ui.label(line);
+        }
+        if let Some(problem) = &gallery.problem {
+            ui.label(RichText::new(problem).color(style::WARN));
+        }
+        chosen
+    });
+    gallery.open = open;
+    let Some(scene) = chosen.and_then(|shown| shown.inner).flatten() else {
+        return;
+    };
+    match shipped::unpacked(scene.name) {
+        Ok(path) => {
+            *gallery = Gallery::new(false);
+            leaving::leave(Way::Open(path), model, state, now);
+        }
+        Err(error) => gallery.problem = Some(error.to_string()),
+    }
+}
+
+/// Draws all pictures with their names; returns the one that was clicked.
+fn pictures(ui: &mut Ui) -> Option<&'static Shipped> {
+    let mut chosen = None;
+    egui::Grid::new("gallery").num_columns(COLUMNS).spacing([10.0, 8.0]).show(ui, |ui| {
+        for (index, scene) in SCENES.iter().enumerate() {
+            ui.vertical(|ui| {
+                ui.set_width(PICTURE.x);
+                let picture = Image::new(&texture(ui.ctx(), scene))
+                    .max_size(PICTURE)
+                    .corner_radius(4.0)
+                    .sense(Sense::click());
+                let area = vec2(PICTURE.x, PICTURE.y);
+                let shown = ui
+                    .allocate_ui(area, |ui| ui.centered_and_justified(|ui| ui.add(picture)).inner);
+                let picture = shown.inner.on_hover_text(scene.title);
+                let name = ui.selectable_label(false, scene.title);
+                if picture.clicked() || name.clicked() {
+                    chosen = Some(scene);
+                }
+            });
+            if index % COLUMNS == COLUMNS - 1 {
+                ui.end_row();
+            }
+        }
+    });
+    chosen
+}
+
+/// The picture on the device. The context keeps it: another device has another context.
+fn texture(ctx: &Context, scene: &Shipped) -> TextureHandle {
+    let id = Id::new(("gallery", scene.name));
+    if let Some(texture) = ctx.data(|data| data.get_temp::<TextureHandle>(id)) {
+        return texture;
+    }
+    let picture = image::load_from_memory(scene.picture).expect("it ships").to_rgba8();
+    let size = [picture.width() as usize, picture.height() as usize];
+    let picture = egui::ColorImage::from_rgba_unmultiplied(size, &picture);
+    let texture = ctx.load_texture(scene.name, picture, TextureOptions::LINEAR);
+    ctx.data_mut(|data| data.insert_temp(id, texture.clone()));
+    texture
+}

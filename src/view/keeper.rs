@@ -1,0 +1,225 @@
+//! Unsaved work kept on the disk while it is unsaved, so that neither a crash nor a power cut takes it.
+//!
+//! Each session has a folder of its own, beside those of others, in the system's folder for the state of programs:
+//! `scene.toml` is the scene file with the unsaved settings and poses in place, `session.json` says the rest. A lock
+//! that a dead process cannot hold tells which sessions have ended without being asked.
+
+use std::fs::{File, create_dir_all, read_dir, remove_dir_all};
+use std::io::Error;
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Sender, channel};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use serde::{Deserialize, Serialize};
+
+use super::leaving::Unsaved;
+use super::model::{Leftover, Model};
+use super::state::State;
+use crate::output::files;
+use crate::scene::file::{Entry, save};
+
+/// Least time between two writings.
+const PAUSE: Duration = Duration::from_secs(2);
+/// Names of the files of a session.
+const SCENE: &str = "scene.toml";
+const SESSION: &str = "session.json";
+const LOCK: &str = "lock";
+
+/// What `session.json` says.
+#[derive(Serialize, Deserialize)]
+struct Session {
+    /// The scene file, from the root.
+    scene: PathBuf,
+    /// Seconds since 1970.
+    at: u64,
+    /// What is unsaved, in words.
+    what: Vec<String>,
+    left: Leftover,
+}
+
+/// A session that has ended without being asked.
+pub(super) struct Orphan {
+    folder: PathBuf,
+    session: Session,
+    /// Held as long as this session may take it up: no other does meanwhile.
+    _lock: File,
+}
+
+impl Orphan {
+    /// The scene file with its unsaved settings and poses.
+    pub(super) fn scene(&self) -> PathBuf {
+        self.folder.join(SCENE)
+    }
+
+    /// What was unsaved, in words.
+    pub(super) fn what(&self) -> &[String] {
+        &self.session.what
+    }
+
+    /// Time since it was written.
+    pub(super) fn age(&self) -> Duration {
+        Duration::from_secs(now().saturating_sub(self.session.at))
+    }
+
+    /// Measurements and recording.
+    pub(super) fn left(&self) -> Leftover {
+        self.session.left.clone()
+    }
+
+    /// Removes it.
+    pub(super) fn discard(self) {
+        // What cannot be removed is offered once more.
+        let _ = remove_dir_all(&self.folder);
+    }
+}
+
+/// A session to be written.
+struct Draft {
+    entries: Vec<Entry>,
+    session: Session,
+}
+
+/// Keeps the unsaved work of one window.
+pub(super) struct Keeper {
+    /// The folder of all sessions; none where the system has no place for it.
+    all: Option<PathBuf>,
+    writer: Option<(Sender<Option<Draft>>, JoinHandle<()>)>,
+    /// State of the model at the last writing.
+    kept: Option<[u64; 3]>,
+    written: Instant,
+}
+
+impl Default for Keeper {
+    fn default() -> Self {
+        Self { all: None, writer: None, kept: None, written: Instant::now() }
+    }
+}
+
+impl Keeper {
+    pub(super) fn new() -> Self {
+        let state = dirs::state_dir().or_else(dirs::data_local_dir);
+        let all = state.map(|folder| folder.join("insonify").join("unsaved"));
+        Self { all, ..Self::default() }
+    }
+
+    /// The newest session of the scene file at `path` that has ended without being asked.
+    pub(super) fn orphan(&self, path: &Path) -> Option<Orphan> {
+        let scene = path.canonicalize().ok()?;
+        let folders = read_dir(self.all.as_ref()?).ok()?.flatten();
+        let found = folders.filter_map(|entry| taken_up(&entry.path(), &scene));
+        found.max_by_key(|orphan| orphan.session.at)
+    }
+
+    /// Writes what is unsaved, if it has changed and the last time is long enough ago; returns when to call again.
+    pub(super) fn keep(&mut self, model: &Model, state: &State, now: Instant) -> Option<Instant> {
+        let unsaved = Unsaved::of_all(model, state);
+        if unsaved.is_empty() {
+            if self.kept.take().is_some() {
+                self.send(None);
+            }
+            return None;
+        }
+        let rows = model.trajectory.recorder.as_ref().map_or(0, |recorder| recorder.rows());
+        let stand = [model.revision(), model.steps(), rows as u64];
+        if self.kept == Some(stand) {
+            return None;
+        }
+        let due = self.written + PAUSE;
+        if due > now {
+            return Some(due);
+        }
+        (self.kept, self.written) = (Some(stand), now);
+        let scene = model.file.path.canonicalize().unwrap_or_else(|_| model.file.path.clone());
+        let left = Leftover::of(model, state.tools.unfiled(model), now);
+        let session = Session { scene, at: self::now(), what: unsaved.words(), left };
+        self.send(Some(Draft { entries: model.changes(true), session }));
+        None
+    }
+
+    /// Forgets what is kept: it is saved, or the user wants none of it.
+    pub(super) fn forget(&mut self) {
+        self.kept = None;
+        if self.writer.is_some() {
+            self.send(None);
+        }
+        if let Some((sender, thread)) = self.writer.take() {
+            drop(sender);
+            // Its panic is told by `deaths`.
+            let _ = thread.join();
+        }
+    }
+
+    fn send(&mut self, draft: Option<Draft>) {
+        if self.writer.is_none()
+            && let Some(all) = &self.all
+        {
+            self.writer = writer(all.clone());
+        }
+        if let Some((sender, _)) = &self.writer {
+            // A writer that has died is told by `deaths`.
+            let _ = sender.send(draft);
+        }
+    }
+}
+
+/// Starts the thread that writes; none where the system has no room for one, which other threads tell.
+fn writer(all: PathBuf) -> Option<(Sender<Option<Draft>>, JoinHandle<()>)> {
+    let (sender, drafts) = channel::<Option<Draft>>();
+    let work = move || {
+        let mut own: Option<(PathBuf, File)> = None;
+        while let Ok(first) = drafts.recv() {
+            // The newest counts.
+            let newest = drafts.try_iter().last().unwrap_or(first);
+            let done = match newest {
+                Some(draft) => write(&all, &mut own, &draft),
+                None => own.take().map_or(Ok(()), |(folder, _)| remove_dir_all(folder)),
+            };
+            if let Err(error) = done {
+                crate::output::note(format!("unsaved work is not kept: {error}"));
+            }
+        }
+    };
+    let thread = thread::Builder::new().name("keeper".into()).spawn(work).ok()?;
+    Some((sender, thread))
+}
+
+/// Writes a draft into the session's own folder, which is made for the first.
+fn write(all: &Path, own: &mut Option<(PathBuf, File)>, draft: &Draft) -> Result<(), Error> {
+    let (folder, _) = match own {
+        Some(own) => own,
+        None => own.insert(folder(all)?),
+    };
+    let saved = save(&draft.session.scene, &folder.join(SCENE), &draft.entries);
+    saved.map_err(|error| Error::other(error.to_string()))?;
+    let text = serde_json::to_vec(&draft.session).map_err(Error::other)?;
+    files::replace(&folder.join(SESSION), &text)
+}
+
+/// A folder that no other session has, with its lock.
+fn folder(all: &Path) -> Result<(PathBuf, File), Error> {
+    create_dir_all(all)?;
+    let names = (0..).map(|number: u32| all.join(format!("{}-{number}", std::process::id())));
+    let folder =
+        names.into_iter().find(|folder| !folder.exists()).expect("there is no last number");
+    create_dir_all(&folder)?;
+    let lock = File::create(folder.join(LOCK))?;
+    lock.try_lock()?;
+    Ok((folder, lock))
+}
+
+/// The session in a folder, where it is one of `scene` and nobody's.
+fn taken_up(folder: &Path, scene: &Path) -> Option<Orphan> {
+    let session: Session =
+        serde_json::from_slice(&std::fs::read(folder.join(SESSION)).ok()?).ok()?;
+    if session.scene != scene {
+        return None;
+    }
+    let lock = File::options().write(true).open(folder.join(LOCK)).ok()?;
+    lock.try_lock().ok()?;
+    Some(Orphan { folder: folder.to_owned(), session, _lock: lock })
+}
+
+fn now() -> u64 {
+    SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs()
+}

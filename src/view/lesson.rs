@@ -1,0 +1,300 @@
+//! The lesson: tasks of the scene, a guide on the way, the score at the end, and the history of the learner.
+
+mod marking;
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use egui::{Color32, Context, RichText, Shape, Stroke, TextEdit, Ui};
+use glam::{DAffine3, DVec3};
+
+use self::marking::{Marking, Order, marked};
+use super::look::Pictured;
+use super::model::trajectory::Recorder;
+use super::model::{Model, Source};
+use super::style::{self, button};
+use super::view3d;
+use crate::scene::task::{Goal, Task};
+use crate::settings::Words as _;
+use crate::teach::history;
+use crate::teach::{Score, guide};
+
+/// Width of the panel, points.
+const WIDTH: f32 = 300.0;
+/// Colour of the target, and of the way that was gone.
+const GHOST: Color32 = Color32::from_rgb(120, 210, 120);
+
+/// The panel's state; not saved.
+#[derive(Default)]
+pub(super) struct Lesson {
+    /// True while the panel is open.
+    pub(super) open: bool,
+    /// The chosen task.
+    chosen: usize,
+    /// True in examiner's mode: no guide.
+    examiner: bool,
+    /// True where the guide is wanted.
+    guide: bool,
+    /// Hints that have been asked for.
+    hints: usize,
+    /// The attempt under way.
+    run: Option<Run>,
+    /// The attempt that is being scored.
+    marking: Option<Marking>,
+    /// The last score, and the way that was gone.
+    result: Option<(Score, Vec<DVec3>)>,
+    problem: Option<String>,
+    learner: String,
+    measured: String,
+    answer: Option<usize>,
+}
+
+/// An attempt under way.
+struct Run {
+    recorder: Recorder,
+    guided: bool,
+}
+
+impl Lesson {
+    /// The target to be shown in 3D, while the guide shows it.
+    fn ghost(&self, model: &Model) -> Option<DAffine3> {
+        let goal = &model.tasks.get(self.chosen)?.goal;
+        match goal {
+            Goal::View(target) if self.guides() => Some(target.world_from_probe),
+            _ => None,
+        }
+    }
+
+    /// The way of the last attempt, to be shown in 3D; the middle of the probe's face.
+    fn way(&self) -> &[DVec3] {
+        match &self.result {
+            Some((_, way)) if self.open => way,
+            _ => &[],
+        }
+    }
+
+    fn guides(&self) -> bool {
+        self.open && self.run.is_some() && self.guide && !self.examiner
+    }
+}
+
+/// Draws the panel if it is open, and notes how the probe moves.
+pub(super) fn show(ctx: &Context, model: &mut Model, lesson: &mut Lesson, now: Instant) {
+    let guides = lesson.guides();
+    if let Some(run) = &mut lesson.run {
+        run.recorder.note("lesson", model.pose, now);
+        run.guided |= guides || model.layer.shown;
+    }
+    if let Some(marking) = &lesson.marking
+        && let Some(found) = marking.done()
+    {
+        lesson.marking = None;
+        match found {
+            Ok(result) => lesson.result = Some(result),
+            Err(problem) => lesson.problem = Some(problem),
+        }
+    }
+    if !lesson.open {
+        return;
+    }
+    let mut open = true;
+    let window = egui::Window::new("Lesson")
+        .open(&mut open)
+        .resizable(false)
+        // Beside the tools, below most images.
+        .default_pos([56.0, 420.0]);
+    window.default_pos([12.0, 44.0]).show(ctx, |ui| {
+        ui.set_width(WIDTH);
+        if model.tasks.is_empty() {
+            ui.label("This scene sets no tasks. They stand in its file, as [[task]].");
+            return;
+        }
+        lesson.chosen = lesson.chosen.min(model.tasks.len() - 1);
+        match lesson.run.is_some() {
+            false => before(ui, model, lesson, now),
+            true => during(ui, model, lesson, now),
+        }
+        if lesson.marking.is_some() {
+            ui.label("Scoring ...");
+        }
+        if let Some(problem) = &lesson.problem {
+            ui.label(RichText::new(problem).color(style::WARN));
+        }
+    });
+    lesson.open = open;
+}
+
+/// Draws the target and the way of the last attempt over the 3D view, by the picture's own camera.
+pub(super) fn in_3d(
+    ui: &Ui,
+    place: &view3d::Place,
+    model: &Model,
+    lesson: &Lesson,
+    pictured: Option<&Pictured>,
+) {
+    let Some(pictured) = pictured else { return };
+    let painter = ui.painter_at(place.rect);
+    let at = |point: DVec3| place.project(&pictured.look.camera, point);
+    if let Some(target) = lesson.ghost(model) {
+        let border = view3d::outline(&pictured.probe);
+        let border = border.into_iter().map(|point| at(target.transform_point3(point)));
+        if let Some(mut corners) = border.collect::<Option<Vec<_>>>() {
+            // The face closes it, so that it is no fan of the probe itself.
+            corners.extend(corners.first().copied());
+            painter.add(Shape::line(corners, Stroke::new(2.0, GHOST)));
+        }
+        let (start, _) = pictured.probe.ray(0, 0);
+        if let Some(mark) = at(target.transform_point3(DVec3::new(start.x, 0.0, start.z))) {
+            painter.circle_filled(mark, 4.0, GHOST);
+        }
+    }
+    let way: Option<Vec<_>> = lesson.way().iter().map(|&point| at(point)).collect();
+    if let Some(way) = way {
+        painter.add(Shape::line(way, Stroke::new(2.0, GHOST)));
+    }
+}
+
+/// Choice of a task, and the last result.
+fn before(ui: &mut Ui, model: &mut Model, lesson: &mut Lesson, now: Instant) {
+    let all: Vec<usize> = (0..model.tasks.len()).collect();
+    let was = lesson.chosen;
+    let name = |index: usize| model.tasks[index].name.clone();
+    style::choice(ui, ("task", WIDTH - 12.0), &mut lesson.chosen, &all, name);
+    if was != lesson.chosen {
+        (lesson.result, lesson.problem) = (None, None);
+    }
+    ui.label(&model.tasks[lesson.chosen].text);
+    ui.checkbox(&mut lesson.examiner, "Examination").on_hover_text("Without guide and overlay");
+    ui.horizontal(|ui| {
+        ui.label("Learner");
+        let field = TextEdit::singleline(&mut lesson.learner).desired_width(150.0);
+        ui.add(field.hint_text("name, for the history"))
+            .on_hover_text(folder().map_or_else(String::new, |at| at.display().to_string()));
+    });
+    let idle = lesson.marking.is_none();
+    if idle && button(ui, "Start", "The time begins, and the probe's way is recorded") {
+        start(model, lesson, now);
+    }
+    if let Some((score, _)) = &lesson.result {
+        ui.separator();
+        let (word, colour) = match score.reached {
+            true => ("Reached", GHOST),
+            false => ("Not reached", style::WARN),
+        };
+        ui.label(RichText::new(word).color(colour).strong());
+        for reason in &score.reasons {
+            ui.label(reason);
+        }
+        for line in score.lines() {
+            ui.label(RichText::new(line).color(style::FAINT));
+        }
+        if let Goal::Question(question) = &model.tasks[lesson.chosen].goal {
+            ui.label(&question.explanation);
+        }
+    }
+}
+
+fn start(model: &mut Model, lesson: &mut Lesson, now: Instant) {
+    if let Some(pose) = model.tasks[lesson.chosen].start {
+        model.place_probe(Source::Pointer, pose, now);
+    }
+    if lesson.examiner && model.layer.shown {
+        model.layer.shown = false;
+        model.touch(now);
+    }
+    let recorder = Recorder::new(model.pose, model.clock.at(now), now);
+    lesson.run = Some(Run { recorder, guided: false });
+    (lesson.result, lesson.problem, lesson.answer, lesson.hints) = (None, None, None, 0);
+    lesson.measured.clear();
+}
+
+/// What is to be done, the guide, and the way to hand it in.
+fn during(ui: &mut Ui, model: &mut Model, lesson: &mut Lesson, now: Instant) {
+    let task = model.tasks[lesson.chosen].clone();
+    ui.label(RichText::new(&task.name).strong());
+    ui.label(&task.text);
+    if !lesson.examiner {
+        guided(ui, model, lesson, &task, now);
+    }
+    match &task.goal {
+        Goal::Measure(measurement) => drop(ui.horizontal(|ui| {
+            ui.label("Measured");
+            ui.add(TextEdit::singleline(&mut lesson.measured).desired_width(80.0));
+            ui.label(measurement.unit.word());
+        })),
+        Goal::Question(question) => {
+            for (index, choice) in question.choices.iter().enumerate() {
+                ui.radio_value(&mut lesson.answer, Some(index), choice);
+            }
+        }
+        Goal::View(_) | Goal::Show(_) => {}
+    }
+    let measured = lesson.measured.trim().replace(',', ".").parse::<f64>().ok();
+    let lacks = matches!(task.goal, Goal::Measure(_)) && measured.is_none();
+    ui.horizontal(|ui| {
+        let hand_in = egui::Button::new("Submit");
+        if ui.add_enabled(!lacks, hand_in).on_hover_text("The time ends").clicked()
+            && let Some(run) = lesson.run.take()
+        {
+            let order = Order {
+                file: model.file.path.clone(),
+                overrides: model.file.overrides.clone(),
+                task: task.name.clone(),
+                track: run.recorder.finish(now).track(),
+                measured: measured.filter(|_| matches!(task.goal, Goal::Measure(_))),
+                answer: lesson.answer,
+                guided: run.guided,
+                learner: lesson.learner.trim().to_owned(),
+                folder: folder(),
+            };
+            match marked(order, ui.ctx().clone()) {
+                Ok(marking) => lesson.marking = Some(marking),
+                Err(problem) => lesson.problem = Some(problem.to_string()),
+            }
+        }
+        if button(ui, "Give up", "Nothing is scored") {
+            lesson.run = None;
+        }
+    });
+}
+
+fn guided(ui: &mut Ui, model: &mut Model, lesson: &mut Lesson, task: &Task, now: Instant) {
+    ui.horizontal(|ui| {
+        if matches!(task.goal, Goal::View(_)) {
+            let tip = "The target in the 3D view, and what to do next";
+            ui.checkbox(&mut lesson.guide, "Guide").on_hover_text(tip);
+        }
+        let tip = "Structures in their colours over the image";
+        if ui.checkbox(&mut model.layer.shown, "Structures").on_hover_text(tip).changed() {
+            model.touch(now);
+        }
+        if lesson.hints < task.hints.len() && button(ui, "Hint", "A hint of the task's author") {
+            lesson.hints += 1;
+        }
+    });
+    for hint in &task.hints[..lesson.hints] {
+        ui.label(RichText::new(hint).color(style::FAINT));
+    }
+    if let (Goal::View(target), true) = (&task.goal, lesson.guides()) {
+        let steps = guide::steps(&model.pose, &target.world_from_probe);
+        let mut left = steps.iter().filter(|step| !step.is_small()).peekable();
+        if left.peek().is_none() {
+            ui.label("You are there: hold the view, and submit.");
+        }
+        for step in left {
+            ui.label(format!("{} {}", step.arrow(), step.words()));
+        }
+    }
+}
+
+/// The folder of the learners' histories.
+fn folder() -> Option<PathBuf> {
+    dirs::data_local_dir().map(|data| data.join("insonify").join("learners"))
+}
+
+/// Notes an attempt in the learner's history.
+fn note(folder: Option<PathBuf>, entry: &history::Entry) -> Result<(), String> {
+    let folder =
+        folder.ok_or("there is no folder for a user's data, so that no history is kept")?;
+    history::add(&folder, entry).map_err(|e| format!("{e}; {}", e.remedy))
+}
