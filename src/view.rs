@@ -4,6 +4,7 @@
 //! picture and never waits for it. A plain [`Model`] holds what is shown and set.
 
 mod app;
+mod beside;
 mod bmode;
 mod calipers;
 mod captures;

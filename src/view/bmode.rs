@@ -7,13 +7,17 @@ use super::engine::{Frame, Sector};
 use super::framing::Framing;
 use super::model::Model;
 use super::{real, style};
-use crate::probe::Kind;
+use crate::probe::{Kind, Probe};
 
 /// Width below which the second row of text has no room for both sides, points.
 const NARROW: f32 = 440.0;
 
 /// Room around the image, points: left (grey bar), top (texts), right (ruler), bottom.
 const MARGINS: [f32; 4] = [52.0, 58.0, 64.0, 16.0];
+/// Distance of the ruler from the image, points.
+const RULER: f32 = 12.0;
+/// Width of the time-gain curve between the grey bar and the image, points.
+const CURVE: f32 = 32.0;
 
 /// Place of a picture on the screen: whole pixels, since it is copied to whole pixels. Drawing
 /// and clicks then fit the picture.
@@ -46,7 +50,10 @@ impl Place {
         framing: &Framing,
         pixels_per_point: f32,
     ) -> Self {
-        let [left, top, right, bottom] = MARGINS;
+        let [mut left, top, right, bottom] = MARGINS;
+        if has_curve(area) {
+            left += CURVE;
+        }
         let room = Rect::from_min_max(area.min + vec2(left, top), area.max - vec2(right, bottom));
         let size = vec2(texels[0] as f32, texels[1] as f32);
         let scale = (room.size() / size).min_elem().max(0.01);
@@ -99,10 +106,20 @@ impl Place {
         )
     }
 
+    /// There is room for the time-gain curve.
+    pub(super) fn has_curve(&self) -> bool {
+        has_curve(self.area)
+    }
+
     /// Length of a point of the screen, mm.
     pub(super) fn mm_per_point(&self) -> f64 {
         1.0 / self.scale[1]
     }
+}
+
+/// Returns whether a pane has room for the time-gain curve.
+fn has_curve(area: Rect) -> bool {
+    area.width() >= NARROW
 }
 
 /// Draws everything around the picture into the remaining room of the window.
@@ -212,7 +229,7 @@ fn label_step(points_per_mm: f32) -> f64 {
 
 fn ruler(painter: &egui::Painter, place: &Place, frame: &Frame) {
     let seen = place.seen();
-    let x = seen.right() + 12.0;
+    let x = seen.right() + RULER;
     let shown = |mm: f64| (seen.top()..=seen.bottom()).contains(&place.at(0.0, mm).y);
     let (depth, step) = (frame.probe.depth, label_step(place.scale[1] as f32));
     let font = FontId::proportional(11.0);
@@ -243,10 +260,17 @@ fn ruler(painter: &egui::Painter, place: &Place, frame: &Frame) {
         let below = within(at(depth)) + vec2(-2.0, 8.0);
         painter.text(below, Align2::CENTER_TOP, text, font, style::ACCENT);
     } else if shown(focus) {
-        let tip = at(focus) - vec2(2.0, 0.0);
-        let corners = vec![tip, tip + vec2(-8.0, -5.0), tip + vec2(-8.0, 5.0)];
-        painter.add(Shape::convex_polygon(corners, style::ACCENT, Stroke::NONE));
+        let middle = focus_mark(place, &frame.probe);
+        let corners = [vec2(4.0, 0.0), vec2(-4.0, -5.0), vec2(-4.0, 5.0)].map(|to| middle + to);
+        painter.add(Shape::convex_polygon(corners.to_vec(), style::ACCENT, Stroke::NONE));
     }
+}
+
+/// Middle of the mark of a probe's transmit focus on the ruler; a focus below the image has it at the lower end.
+pub(super) fn focus_mark(place: &Place, probe: &Probe) -> Pos2 {
+    let seen = place.seen();
+    let y = place.at(0.0, probe.focus.min(probe.depth)).y;
+    pos2(seen.right() + RULER - 6.0, seen.y_range().clamp(y))
 }
 
 /// Draws the grey bar by the grey map: white on top, the lower end of the dynamic range at the bottom.

@@ -37,6 +37,8 @@ pub(super) struct Inputs {
     pub(super) problem: Option<String>,
     /// Time of the next look even if nothing arrives.
     pub(super) due: Option<Instant>,
+    /// Number of the last pose before a loss of the tracker that the user has taken note of.
+    pub(super) dismissed: Option<u64>,
     /// Number of clients that the simulation has been told of.
     greeted: u64,
     /// Number of the tracker's last pose taken over.
@@ -68,6 +70,7 @@ impl Inputs {
             given_up: None,
             problem: None,
             due: None,
+            dismissed: None,
             greeted: 0,
             followed: 0,
         };

@@ -14,8 +14,8 @@ use super::model::mmode::Strip;
 use super::state::State;
 use super::statistics::Times;
 use super::{
-    calipers, cine, deaths, exam, files, gallery, keys, leaving, lesson, mmode, naming, notice,
-    offer, planes, saved, strip, style, timing, view3d,
+    beside, calipers, cine, deaths, exam, files, gallery, keys, leaving, lesson, mmode, naming,
+    notice, offer, planes, saved, strip, style, timing, view3d,
 };
 
 /// Width of the toggles and the loop beside each other, points.
@@ -90,13 +90,15 @@ pub(super) fn show(
     let sheet = state.exam.open.then_some(exam::WIDTH).filter(|sheet| {
         let room = ui.available_width();
         let beside = state.view3d.open || state.planes.open;
-        let narrow = view3d::width(room).filter(|_| beside).map(|view3d| room - view3d);
+        let narrow =
+            view3d::width(room, state.share).filter(|_| beside).map(|view3d| room - view3d);
         narrow.is_some_and(|left| left < sheet + LEAST_IMAGE)
     });
     // Transparent: the pictures are below the interface.
     let planes = state.planes.open && model.registration.is_some();
     let beside = (state.view3d.open || planes) && sheet.is_none();
-    let room = view3d::width(ui.available_width()).filter(|_| beside && !alone);
+    let both = ui.available_rect_before_wrap();
+    let room = view3d::width(both.width(), state.share).filter(|_| beside && !alone);
     if let Some(width) = room.filter(|_| planes) {
         let panel = Panel::right("planes").resizable(false).exact_size(width);
         let panel = panel.frame(Space::NONE).show_separator_line(false);
@@ -148,14 +150,20 @@ pub(super) fn show(
         if let (Some(place), Some(frame), Some(strip)) = (&place, frame, &mut model.mmode) {
             mmode::aim(ui, place, frame, strip, model.frozen);
         }
+        if let Some(place) = place.as_ref().filter(|_| !bare) {
+            beside::show(ui, place, model, now);
+        }
         if !bare {
-            notice::show(ui, &state.inputs);
+            notice::show(ui, &mut state.inputs);
             notice::recording(ui, model, now);
             saved::show(ui, &mut state.tools);
             notice::stale(ui, state.stale.as_deref());
         }
         place
     });
+    if let Some(width) = room {
+        view3d::divide(ui, both, width, &mut state.share);
+    }
     if model.mmode.as_ref().map(Strip::line) != line {
         model.touch(now);
     }

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use egui::{Align2, Area, Color32, FontId, Frame, Id, Rect, RichText, ScrollArea, Ui, vec2};
+use egui::{Align2, Area, Color32, FontId, Frame, Id, Rect, RichText, ScrollArea, Sense, Ui, vec2};
 
 use super::inputs::Inputs;
 use super::model::{Model, age};
@@ -13,12 +13,16 @@ use crate::igtl::TrackerState;
 /// Room for the texts on both sides, points.
 const TEXTS: f32 = 300.0;
 
-/// Draws the warning that the tracker is lost: the probe is not at its tool's place.
-pub(super) fn show(ui: &Ui, inputs: &Inputs) {
+/// Draws the warning that the tracker is lost: the probe is not at its tool's place. A click takes it away until the tracker
+/// is lost again.
+pub(super) fn show(ui: &Ui, inputs: &mut Inputs) {
     let Some(TrackerState::Lost(pose)) = inputs.report.as_ref().map(|report| &report.tracked)
     else {
         return;
     };
+    if inputs.dismissed == Some(pose.number) {
+        return;
+    }
     let (since, _) = age(pose.arrived.elapsed());
     let text = format!("TRACKER LOST: {}, {since} ago", pose.device.text());
     let (painter, area) = (ui.painter(), ui.max_rect());
@@ -32,6 +36,10 @@ pub(super) fn show(ui: &Ui, inputs: &Inputs) {
     painter.rect_filled(badge, 4.0, style::WARN);
     let at = Align2::CENTER_CENTER.align_size_within_rect(words.size(), badge);
     painter.galley(at.min, words, Color32::BLACK);
+    let response = ui.interact(badge, Id::new("tracker lost"), Sense::click());
+    if response.on_hover_text("Click to take this away until the tracker is lost again").clicked() {
+        inputs.dismissed = Some(pose.number);
+    }
 }
 
 /// Draws a red sign beside the word for live or frozen while the probe's trajectory is being recorded.

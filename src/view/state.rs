@@ -22,6 +22,8 @@ pub(super) struct State {
     pub(super) timing: bool,
     /// The 3D view.
     pub(super) view3d: super::view3d::State,
+    /// What the 3D view has of the room that it shares with the image.
+    pub(super) share: f32,
     /// Planes through the acquired volume, in place of the 3D view.
     pub(super) planes: super::planes::State,
     /// The shown page of the timing panel.

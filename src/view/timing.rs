@@ -59,7 +59,7 @@ fn colour(stages: &[String], name: &str) -> Color32 {
 fn written(ms: f64) -> String {
     match ms.is_nan() {
         true => "-".into(),
-        false => format!("{ms:.1}"),
+        false => format!("{ms:7.1}"),
     }
 }
 
@@ -120,24 +120,27 @@ fn stages(ui: &mut Ui, times: &Times) {
     // Two columns of stages: a fused frame has more than the panel is high.
     ui.horizontal_top(|ui| {
         for (column, some) in names.chunks(ROWS).enumerate() {
-            egui::Grid::new(("stages", column)).num_columns(3).spacing([6.0, 1.0]).show(ui, |ui| {
-                for head in ["", "median", "p99"] {
-                    ui.small(head);
-                }
-                ui.end_row();
-                for name in some {
-                    ui.horizontal(|ui| {
-                        let (dot, _) =
-                            ui.allocate_exact_size([8.0; 2].into(), egui::Sense::hover());
-                        ui.painter().rect_filled(dot, 2.0, colour(&names, name));
-                        ui.label(name);
-                    });
-                    for cell in pair(&times.stage(name)) {
-                        ui.monospace(cell);
+            egui::Grid::new(("stages", column)).num_columns(3).spacing([10.0, 1.0]).show(
+                ui,
+                |ui| {
+                    for head in ["", "median", "p99"] {
+                        ui.small(head);
                     }
                     ui.end_row();
-                }
-            });
+                    for name in some {
+                        ui.horizontal(|ui| {
+                            let (dot, _) =
+                                ui.allocate_exact_size([8.0; 2].into(), egui::Sense::hover());
+                            ui.painter().rect_filled(dot, 2.0, colour(&names, name));
+                            ui.label(name);
+                        });
+                        for cell in pair(&times.stage(name)) {
+                            ui.monospace(cell);
+                        }
+                        ui.end_row();
+                    }
+                },
+            );
         }
     });
 }
@@ -145,7 +148,7 @@ fn stages(ui: &mut Ui, times: &Times) {
 fn totals(ui: &mut Ui, times: &Times, frame: Option<&Frame>, state: &State) {
     let wall = times.live(|s| s.wall);
     let device = times.of(Sample::device);
-    egui::Grid::new("totals").num_columns(3).spacing([6.0, 1.0]).show(ui, |ui| {
+    egui::Grid::new("totals").num_columns(3).spacing([10.0, 1.0]).show(ui, |ui| {
         for head in ["", "median", "p99"] {
             ui.small(head);
         }

@@ -5,7 +5,9 @@ mod tissues;
 
 use std::time::{Duration, Instant};
 
-use egui::{Align2, FontId, PointerButton, Rect, Response, Sense, Stroke, Ui, pos2, vec2};
+use egui::{
+    Align2, CursorIcon, FontId, Id, PointerButton, Rect, Response, Sense, Stroke, Ui, pos2, vec2,
+};
 use glam::{DVec2, DVec3};
 
 pub(super) use fan::outline;
@@ -17,6 +19,10 @@ use super::style::{self, button};
 
 /// Least useful width of the view, points.
 const LEAST: f32 = 240.0;
+/// The view's share of the room that it has with the image, until the user drags the edge between them.
+pub(super) const USUAL: f32 = 0.38;
+/// Distance of the pointer from that edge within which it is taken, points.
+const GRIP: f32 = 4.0;
 /// Points of a wheel's turn that move the camera a step nearer.
 const NOTCH: f64 = 50.0;
 /// Longest time of a picture while the camera moves, ms; a slower one is made coarser.
@@ -159,10 +165,29 @@ impl Place {
     }
 }
 
-/// Width of the view in a room of `width` points; none where both parts would be too narrow.
-pub(super) fn width(width: f32) -> Option<f32> {
-    let half = (width / 2.0).floor();
-    (half >= LEAST).then_some(half)
+/// Width of the view in a room of `width` points of which it is to have `share`; none where both parts would be too
+/// narrow.
+pub(super) fn width(width: f32, share: f32) -> Option<f32> {
+    let most = (width - LEAST).floor();
+    (most >= LEAST).then(|| (width * share).floor().clamp(LEAST, most))
+}
+
+/// Lets the pointer drag the edge between the image and a view of `width` points at the right of `room`; a double click
+/// puts it back.
+pub(super) fn divide(ui: &Ui, room: Rect, width: f32, share: &mut f32) {
+    let edge = room.right() - width;
+    let grip = Rect::from_x_y_ranges(edge - GRIP..=edge + GRIP, room.y_range());
+    let response = ui.interact(grip, Id::new("divider"), Sense::click_and_drag());
+    let response = response.on_hover_and_drag_cursor(CursorIcon::ResizeHorizontal);
+    if let Some(at) = response.interact_pointer_pos().filter(|_| response.dragged()) {
+        *share = ((room.right() - at.x) / room.width()).clamp(0.0, 1.0);
+    }
+    if response.double_clicked() {
+        *share = USUAL;
+    }
+    if response.hovered() || response.dragged() {
+        ui.painter().vline(edge, room.y_range(), Stroke::new(2.0, style::ACCENT));
+    }
 }
 
 /// Draws everything over the picture into the whole of `ui`, and moves the camera.
@@ -314,7 +339,10 @@ mod tests {
 
     #[test]
     fn there_is_no_view_where_there_is_no_room() {
-        assert_eq!(width(300.0), None);
-        assert_eq!(width(945.0), Some(472.0));
+        assert_eq!(width(479.0, 0.5), None);
+        assert_eq!(width(945.0, 0.5), Some(472.0));
+        // Neither part becomes too narrow.
+        assert_eq!(width(945.0, 0.0), Some(240.0));
+        assert_eq!(width(945.0, 1.0), Some(705.0));
     }
 }

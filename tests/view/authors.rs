@@ -48,12 +48,13 @@ fn a_right_click_names_what_is_there_and_opens_its_settings() {
     };
     let console = [1280 - 336, 380, 336, 330];
     // The cyst in the image, and its tissue.
-    let beside = [166, 252, 60, 40];
+    let (x, y) = (221, 262);
+    let beside = [x + 12, y + 8, 60, 40];
     let before = (desk.settle(beside), desk.settle(console));
-    desk.click_right((154, 244));
+    desk.click_right((x, y));
     desk.wait_for("a name", |d| difference(&d.grab(beside), &before.0) > 3.0);
     desk.still(beside);
-    desk.click((199, 304));
+    desk.click((x + 45, y + 60));
     desk.wait_for("its settings", |d| difference(&d.grab(console), &before.1) > 1.0);
     desk.quit();
 }

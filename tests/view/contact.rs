@@ -45,7 +45,7 @@ translate = [0, 0, "2 cm"]
 "#;
 
 /// Part of the default window with the 3D view: left of the console, right of the image, above the bar.
-const VIEW: [u16; 4] = [472, 0, 472, 684];
+const VIEW: [u16; 4] = [586, 0, 358, 684];
 /// Within the image, beside the texts.
 const IMAGE: [u16; 4] = [120, 120, 230, 230];
 

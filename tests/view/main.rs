@@ -3,6 +3,7 @@
 
 // Shared with the tests of the protocol, which use all of it.
 mod authors;
+mod beside;
 #[allow(dead_code)]
 #[path = "../igtl/client.rs"]
 mod client;

@@ -49,7 +49,7 @@ const VOLUME: &str = "NDims = 3\nDimSize = 60 2 2\nElementSpacing = 1 50 50\n\
 
 /// The part with the image, beside the planes, and the first of these: x to the right, z down.
 const IMAGE: [u16; 4] = [60, 60, 360, 420];
-const PLANES: [u16; 4] = [472, 30, 472, 640];
+const PLANES: [u16; 4] = [586, 30, 358, 640];
 
 #[test]
 fn a_volume_is_moved_turned_and_put_back_by_the_pointer_and_saved() {
@@ -76,11 +76,11 @@ fn a_volume_is_moved_turned_and_put_back_by_the_pointer_and_saved() {
         let (scene, _) = loaded.expect("it stays sound");
         scene.volume.expect("a volume").world_from_lps
     };
-    // Somewhere in the first plane, off its middle at (708, 138).
-    let (from, to) = ((760, 150), (800, 150));
+    // Somewhere in the first plane, off its middle at (765, 138).
+    let (from, to) = ((817, 150), (857, 150));
     for (name, held) in [("move", None), ("turn", Some(Key::Shift)), ("scale", Some(Key::Control))]
     {
-        let to = if name == "turn" { (740, 190) } else { to };
+        let to = if name == "turn" { (797, 190) } else { to };
         if let Some(held) = held {
             desk.hold(held, true);
         }

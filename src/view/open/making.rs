@@ -64,6 +64,7 @@ impl Open {
             framing: Default::default(),
             timing: false,
             view3d: view3d::State::default(),
+            share: view3d::USUAL,
             planes: planes::State::default(),
             times: timing::Page::default(),
             help: false,
