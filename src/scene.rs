@@ -19,6 +19,7 @@ mod load_gltf;
 mod load_obj;
 pub mod mesh;
 pub mod normals;
+mod orientation;
 mod origin;
 pub mod palette;
 pub mod shapes;
@@ -38,6 +39,7 @@ pub use file::SceneError;
 pub use fusion::Acquired;
 pub use graph::Graph;
 pub use keyframes::{Keyframes, Strategy};
+pub use orientation::Orientation;
 pub use origin::{Origin, Origins};
 pub use task::Task;
 pub use tracker::Tracker;
@@ -148,6 +150,8 @@ pub struct NamedPose {
 pub struct Scene {
     /// Title.
     pub name: String,
+    /// How the patient lies in the world, where the file says it.
+    pub orientation: Option<Orientation>,
     /// Tissue table; meshes and background index it.
     pub tissues: Vec<Tissue>,
     /// Tissue outside every mesh: index into [`Scene::tissues`].
@@ -210,6 +214,7 @@ impl Scene {
             settings: Settings::of(probe),
             world_from_probe: DAffine3::IDENTITY,
             poses: Vec::new(),
+            orientation: None,
             tasks: Vec::new(),
             volume: None,
             fusion: None,

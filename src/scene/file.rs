@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::silent::silent;
 use super::vary::Variant;
-use super::{Origins, Scene, Tissue, Warning};
+use super::{Orientation, Origins, Scene, Tissue, Warning};
 
 mod again;
 mod anatomy;
@@ -113,6 +113,7 @@ impl Scene {
         let instances = anatomy.origins(&file.mesh);
         let wires = anatomy::wires(&file.wire);
         let settings = settings::settings(&document, &file, None)?;
+        let orientation = orientation(&document, file.orientation.as_deref())?;
         let world_from_probe = probe::pose(&document, "probe", &file.probe.stated)?;
         let poses = poses::build(&document, &file.pose)?;
         presentable(&document, &settings)?;
@@ -151,6 +152,7 @@ impl Scene {
         let origins = Origins { instances, bases: tissues.iter().map(bases).collect() };
         let mut scene = Self {
             name,
+            orientation,
             tissues,
             background,
             meshes: anatomy.meshes,
@@ -186,6 +188,20 @@ pub fn volume_of(path: &Path) -> Vec<PathBuf> {
     let file = Source::read(path, &[]).and_then(|source| source.document()?.parse());
     let table = file.ok().and_then(|file| file.volume);
     table.map_or_else(Vec::new, |table| fusion::files(&table.stated))
+}
+
+/// How the patient lies, as the file says it.
+fn orientation(
+    document: &Document<'_>,
+    stated: Option<&str>,
+) -> Result<Option<Orientation>, SceneError> {
+    let remedy =
+        "give the sides to which x, y and z grow, such as `LPS`: a letter each of R L, A P and S I";
+    let parsed = stated.map(|text| {
+        let failed = |why| document.fail("orientation", format!("`{text}` {why}"), remedy);
+        Orientation::of(text).map_err(failed)
+    });
+    parsed.transpose()
 }
 
 /// Fails on a picture wider than can be written or sent.

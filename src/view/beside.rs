@@ -97,6 +97,6 @@ fn curve(ui: &Ui, place: &Place, model: &mut Model) {
     inside.add(Shape::line(points.clone(), Stroke::new(1.0, style::FAINT)));
     for (number, point) in points.into_iter().enumerate() {
         let colour = if taken == Some(number) { style::ACCENT } else { style::FAINT };
-        inside.circle_filled(point, if taken == Some(number) { 4.0 } else { 2.5 }, colour);
+        inside.circle_filled(point, if taken == Some(number) { 4.0 } else { 3.0 }, colour);
     }
 }

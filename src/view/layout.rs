@@ -44,6 +44,7 @@ pub(super) fn show(
     (frame, pictured): (Option<&Frame>, Option<&Pictured>),
     now: Instant,
 ) -> Places {
+    model.hold_pointer(ui.input(|input| input.pointer.any_down()));
     let line = model.mmode.as_ref().map(Strip::line);
     if state.console {
         Panel::right("console")

@@ -103,7 +103,9 @@ fn buttons(ui: &mut Ui, room: Rect, registration: &mut Registration, open: &mut 
                 *open = false;
             }
             let hint = "drag: move  Shift: turn  Ctrl: scale  right: meeting point  wheel: through";
-            ui.label(egui::RichText::new(hint).size(10.0).color(style::FAINT));
+            let hint = egui::RichText::new(hint).size(10.0).color(style::FAINT);
+            // A view wider than its panel would lie over the image.
+            ui.add(egui::Label::new(hint).truncate());
         });
     });
 }

@@ -1,5 +1,6 @@
 //! The 3D view: anatomy, probe and fan, pictured by the simulation; the pointer moves the camera.
 
+mod compass;
 mod fan;
 mod tissues;
 
@@ -222,13 +223,12 @@ pub(super) fn show(
     painter.vline(place.rect.left(), place.rect.y_range(), edge);
     let below = place.rect.left_bottom() + vec2(10.0, -8.0);
     let hint = match model.hold.is_some() {
-        true => {
-            "probe, skin: drag slides, Shift leans, Ctrl+wheel rotates; right drag turns the view"
-        }
+        true => "skin: drag slides, Shift leans, Ctrl+wheel rotates; right drag: turn",
         false => "drag: turn    Shift+drag: move    wheel: nearer, farther",
     };
     let font = FontId::proportional(10.0);
     painter.text(below, Align2::LEFT_BOTTOM, hint, font, style::FAINT);
+    compass::show(ui, &place, &mut model.view3d);
     buttons(ui, &place, model, state);
     if state.tissues {
         tissues::show(ui, place.rect, &mut model.view3d.shown);
@@ -262,7 +262,7 @@ fn buttons(ui: &mut Ui, place: &Place, model: &mut Model, state: &mut State) {
     let room = Rect::from_min_max(at, pos2(place.rect.right() - 8.0, at.y + 24.0));
     let pose = model.pose;
     ui.scope_builder(egui::UiBuilder::new().max_rect(room), |ui| {
-        ui.horizontal(|ui| {
+        ui.horizontal_wrapped(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
             ui.toggle_value(&mut state.tissues, "Tissues")
                 .on_hover_text("Which tissues are shown, and which as glass");

@@ -29,11 +29,11 @@ fn points(desk: &Desk) -> Vec<u16> {
     let rows = pixels.chunks_exact(3 * usize::from(ZERO[2]));
     // Wider than the line between the points.
     let wide =
-        rows.map(|row| row.chunks_exact(3).filter(|p| p[0].abs_diff(POINT[0]) < 40).count() >= 5);
+        rows.map(|row| row.chunks_exact(3).filter(|p| p[0].abs_diff(POINT[0]) < 50).count() >= 4);
     let mut found: Vec<u16> = Vec::new();
     for (row, _) in wide.enumerate().filter(|(_, wide)| *wide) {
         let y = ZERO[1] + row as u16;
-        if found.last().is_none_or(|last| y > last + 4) {
+        if found.last().is_none_or(|last| y > last + 20) {
             found.push(y);
         }
     }
@@ -71,7 +71,8 @@ fn the_time_gain_is_dragged_at_its_depth() {
     desk.settle(IMAGE);
     let rows = points(&desk);
     assert_eq!(rows.len(), 8, "{rows:?}");
-    let band = |y: u16| [200, y - 20, 200, 40];
+    // Where the words about the slider under the pointer do not reach.
+    let band = |y: u16| [380, y - 20, 120, 40];
     let (near, far) = (band(rows[1]), band(rows[6]));
     let before = (desk.grab(near), desk.grab(far));
     desk.pull((60, rows[6] + 1), (42, rows[6] + 1));

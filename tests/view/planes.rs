@@ -48,7 +48,7 @@ const VOLUME: &str = "NDims = 3\nDimSize = 60 2 2\nElementSpacing = 1 50 50\n\
     Offset = -30 -25 -5\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n";
 
 /// The part with the image, beside the planes, and the first of these: x to the right, z down.
-const IMAGE: [u16; 4] = [60, 60, 360, 420];
+const IMAGE: [u16; 4] = [90, 60, 330, 420];
 const PLANES: [u16; 4] = [586, 30, 358, 640];
 
 #[test]

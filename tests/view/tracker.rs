@@ -126,6 +126,11 @@ fn a_lost_tracker_is_shown_with_its_name_and_since_when() {
     }
     desk.wait_for("the image to move", |d| difference(&d.grab(IMAGE), &before) > 4.0);
     assert!(amber(&desk.grab(NOTICE)) > 0.05);
+    // A click on it takes it away, until the tracker has come back and is lost again.
+    desk.click((293, 74));
+    desk.wait_for("the notice to be taken away", |d| amber(&d.grab(NOTICE)) == 0.0);
+    client.transform("Probe", shift(2.0, 0.0, 0.0));
+    desk.wait_for("the notice again", |d| amber(&d.grab(NOTICE)) > 0.05);
     desk.wait_for("the notice to go", |d| {
         client.transform("Probe", shift(1.0, 0.0, 0.0));
         amber(&d.grab(NOTICE)) == 0.0

@@ -177,6 +177,7 @@ const HEAD: &str = r#"# World frame, mm: that of the probe, x towards the mother
 # coupling gel. Sizes: Robinson and Fleming, Br J Obstet Gynaecol 1975;82:702-710.
 name = "Fetus of eleven weeks"
 background = "gel"
+orientation = "IRP"
 
 [probe]
 preset = "abdominal"

@@ -79,7 +79,8 @@ pub fn scene(parts: &[Part], folder: &str, command: &str, triangles: usize) -> S
          # World frame, mm: x to the patient's left, y posterior, z superior. Outside the skin is\n\
          # coupling gel.\n\
          name = \"Upper abdomen\"\n\
-         background = \"gel\"\n\n\
+         background = \"gel\"\n\
+         orientation = \"LPS\"\n\n\
          [probe]\n\
          preset = \"abdominal\"\n\n\
          [imaging]\n\

@@ -47,6 +47,7 @@ fn head(name: &str, background: &str, more: &str) -> String {
     format!(
         r#"name = "{name}"
 background = "{background}"
+orientation = "IRP"
 
 [probe]
 preset = "abdominal"

@@ -84,6 +84,7 @@ fn head(case: &Case, name: &str, background: &str, more: &str) -> String {
     format!(
         r#"name = "{name}"
 background = "{background}"
+orientation = "LPS"
 
 # An endocavity array: the paper's probe with a wider sector.
 [probe]

@@ -34,6 +34,9 @@ group! {
         name: Option<String> = None, Facts::of(Form::Text).by_default("the file's name");
         /// Tissue outside every mesh.
         background: String = "water".to_owned(), Facts::of(Form::Text);
+        /// Sides of the patient to which the world's x, y and z grow, a letter each of R L (right, left) A P (front, back)
+        /// S I (head, feet), `LPS` for instance. The window's 3D view then shows where the patient's sides are.
+        orientation: Option<String> = None, Facts::of(Form::Text).by_default("not known");
     }
 }
 
@@ -43,6 +46,7 @@ group! {
 pub struct File {
     pub name: Option<String>,
     pub background: Option<String>,
+    pub orientation: Option<String>,
     #[serde(default)]
     pub probe: Table<Probe>,
     #[serde(default)]

@@ -250,6 +250,8 @@ fn mistakes_are_placed_and_come_with_a_remedy() {
     f("[probe.pose]\ndirection = [0, nan, 1]\n", (2, 13), "no length", "vector");
     f("[simulation]\nsampling = \"main-pth\"\n", (2, 12), "unknown variant", "`main-path`");
     f("background = \"livr\"\n", (1, 14), "unknown tissue `livr`", "`liver`");
+    f("orientation = \"LPX\"\n", (1, 15), "`LPX` is not three such letters", "`LPS`");
+    f("orientation = \"RPS\"\n", (1, 15), "mirrored", "`LPS`");
     f(&cube.replace("cube", "cub"), (3, 8), "cub.obj: cannot be read", "check the path");
     f(&cube.replace("\"liver\"", "\"muslce\""), (4, 10), "unknown tissue", "`muscle`");
     f(&format!("{cube}node = \"x\"\n"), (5, 8), "no node or object `x`", "choose one of");

@@ -65,6 +65,11 @@ impl Camera {
         self.turn = DQuat::from_mat3(&DMat3::from_cols(x, -y, -z)).normalize();
     }
 
+    /// Looks at the target from the side `from`, with `above` upward: directions in the world at right angles.
+    pub fn look_from(&mut self, from: DVec3, above: DVec3) {
+        self.turn = DQuat::from_mat3(&DMat3::from_cols(above.cross(from), above, from)).normalize();
+    }
+
     /// Goes around the target by `by` (to the right and down), a drag over the panel's smaller side
     /// being half a turn.
     pub fn orbit(&mut self, panel: DVec2, by: DVec2) {

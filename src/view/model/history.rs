@@ -32,6 +32,8 @@ pub(super) struct History {
     past: Vec<Step>,
     future: Vec<Step>,
     last: Option<Gesture>,
+    /// A button of the pointer is down.
+    held: bool,
     /// Number of steps so far, those back and forth included.
     steps: u64,
 }
@@ -48,7 +50,9 @@ impl History {
     pub(super) fn push(&mut self, before: Step, of: Vec<String>, now: Instant) {
         self.steps += 1;
         let last = self.last.as_ref().filter(|_| !of.is_empty());
-        let goes_on = last.is_some_and(|last| now - last.at < GESTURE && last.of == of);
+        // On a slow machine the parts of a drag come late.
+        let goes_on =
+            last.is_some_and(|last| last.of == of && (self.held || now - last.at < GESTURE));
         self.last = Some(Gesture { of, at: now });
         self.future.clear();
         if goes_on && !self.past.is_empty() {
@@ -63,6 +67,14 @@ impl History {
     /// Makes the next change a step of its own.
     pub(super) fn end_gesture(&mut self) {
         self.last = None;
+    }
+
+    /// Notes whether a button of the pointer is down: what changes meanwhile is one change.
+    pub(super) fn hold(&mut self, held: bool) {
+        if held && !self.held {
+            self.end_gesture();
+        }
+        self.held = held;
     }
 
     /// Forgets the steps of the settings: they are those of other anatomy.
@@ -111,6 +123,11 @@ impl Model {
     pub fn keep_trajectory(&mut self, stored: StoredTrajectory, now: Instant) {
         let before = self.trajectory.stored.replace(stored);
         self.history.push(Step::Trajectory(before), Vec::new(), now);
+    }
+
+    /// Notes whether a button of the pointer is down: what it drags is one change, however long that takes.
+    pub fn hold_pointer(&mut self, held: bool) {
+        self.history.hold(held);
     }
 
     /// Goes back by one change, if there is one.

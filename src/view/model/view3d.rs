@@ -4,8 +4,8 @@ use glam::{DAffine3, DVec2, DVec3};
 
 use super::camera::Camera;
 use crate::probe::{Kind, Probe};
-use crate::scene::Scene;
 use crate::scene::palette::{self, Show};
+use crate::scene::{Orientation, Scene};
 use crate::sim::view3d::CameraView;
 
 /// Opacity of a see-through surface, looked at squarely.
@@ -57,6 +57,8 @@ pub struct View3d {
     tissues: Vec<usize>,
     /// Ends of wires, world, mm.
     pub wires: Vec<[DVec3; 2]>,
+    /// How the patient lies in the world, where the scene says it.
+    pub orientation: Option<Orientation>,
 }
 
 impl View3d {
@@ -89,6 +91,7 @@ impl View3d {
             shown,
             tissues: scene.instances.iter().map(|i| i.tissue).collect(),
             wires: (scene.wires.iter()).map(|wire| wire.ends.map(DVec3::from)).collect(),
+            orientation: scene.orientation,
         }
     }
 
