@@ -81,7 +81,7 @@ impl Report {
             out.push_str("<h2>Measured</h2>\n<table>\n");
         }
         for line in lines {
-            let unit = line.item.quantity.unit();
+            let unit = line.quantity.unit();
             let all: Vec<String> = line.values.iter().map(|value| format!("{value:.1}")).collect();
             let several =
                 if all.len() > 1 { format!("mean of {}", all.join(", ")) } else { String::new() };
@@ -89,9 +89,9 @@ impl Report {
                 out,
                 "<tr><th>{}</th><td class=\"n\">{:.1} {unit}</td><td><small>{several}</small></td>\
                  <td><small>{}</small></td></tr>",
-                plain(line.item.name),
+                plain(&line.name),
                 line.mean(),
-                plain(line.item.meaning)
+                plain(line.meaning)
             );
         }
         if !lines.is_empty() {

@@ -8,7 +8,7 @@ use super::obstetric::{
 };
 use super::packages::{Item, Quantity, items};
 use super::ventricle::{Discs, ellipsoid, lost, teichholz};
-use crate::settings::Exam;
+use crate::settings::{Exam, Words as _};
 
 /// A measurement with a name.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -39,16 +39,33 @@ impl Measured {
     }
 }
 
-/// All values of one item.
+/// All values of one name.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Line {
-    /// The item.
-    pub item: Item,
-    /// Its values in the order of their measuring, in its unit.
+    /// The name.
+    pub name: String,
+    /// What is measured, and between which edges; empty where the user typed the name.
+    pub meaning: &'static str,
+    /// The number that counts.
+    pub quantity: Quantity,
+    /// The values in the order of their measuring, in the quantity's unit.
     pub values: Vec<f64>,
+    /// The measurement of each value: index into those of which the worksheet was made.
+    pub sources: Vec<usize>,
 }
 
 impl Line {
+    fn of(measured: &[Measured], Item { name, meaning, quantity }: Item) -> Self {
+        Self { meaning, ..Self::named(measured, name, quantity) }
+    }
+
+    fn named(measured: &[Measured], name: &str, quantity: Quantity) -> Self {
+        let named = measured.iter().enumerate().filter(|(_, one)| one.name == name);
+        let (sources, values) =
+            named.filter_map(|(place, one)| Some((place, one.value(quantity)?))).unzip();
+        Self { name: name.to_owned(), meaning: "", quantity, values, sources }
+    }
+
     /// Mean of the values.
     pub fn mean(&self) -> f64 {
         self.values.iter().sum::<f64>() / self.values.len() as f64
@@ -77,6 +94,23 @@ pub struct Worksheet {
     pub derived: Vec<Derived>,
 }
 
+/// Lines of the names that no examination has, in the order of their first use.
+fn typed(measured: &[Measured]) -> impl Iterator<Item = Line> {
+    const ALL: [Quantity; 4] =
+        [Quantity::Length, Quantity::Circumference, Quantity::Area, Quantity::Angle];
+    let known =
+        |name: &str| Exam::ALL.iter().any(|exam| items(*exam).any(|item| item.name == name));
+    let mut names: Vec<&str> = Vec::new();
+    for one in measured {
+        let name = one.name.as_str();
+        if !name.trim().is_empty() && !names.contains(&name) && !known(name) {
+            names.push(name);
+        }
+    }
+    let lines = |name| ALL.map(|quantity| Line::named(measured, name, quantity));
+    names.into_iter().flat_map(lines)
+}
+
 const HADLOCK_AGE: &str = "Hadlock, Radiology 1984;152:497";
 const HADLOCK_CRL: &str = "Hadlock, Radiology 1992;182:501";
 const HADLOCK_WEIGHT: &str = "Hadlock, Am J Obstet Gynecol 1985;151:333";
@@ -86,14 +120,12 @@ const ASE: &str = "Lang, J Am Soc Echocardiogr 2015;28:1";
 const ELLIPSOID: &str = "ellipsoid of three axes";
 
 impl Worksheet {
-    /// The worksheet of these measurements; those without a name of the examination are left out.
+    /// The worksheet of these measurements: what the examination names, then names that the user typed. Those without
+    /// a name, and those with one of another examination, are left out.
     pub fn of(exam: Exam, measured: &[Measured]) -> Self {
-        let line = |item: &Item| {
-            let named = measured.iter().filter(|one| one.name == item.name);
-            let values: Vec<f64> = named.filter_map(|one| one.value(item.quantity)).collect();
-            (!values.is_empty()).then_some(Line { item: *item, values })
-        };
-        let mut sheet = Self { lines: items(exam).filter_map(line).collect(), derived: Vec::new() };
+        let of_exam = items(exam).map(|item| Line::of(measured, *item));
+        let lines = of_exam.chain(typed(measured)).filter(|line| !line.values.is_empty()).collect();
+        let mut sheet = Self { lines, derived: Vec::new() };
         match exam {
             Exam::Obstetric => sheet.pregnancy(),
             Exam::Cardiac => sheet.heart(measured),
@@ -114,7 +146,7 @@ impl Worksheet {
 
     /// Mean of an item; none where it was not measured.
     pub fn mean(&self, name: &str) -> Option<f64> {
-        self.lines.iter().find(|line| line.item.name == name).map(Line::mean)
+        self.lines.iter().find(|line| line.name == name).map(Line::mean)
     }
 
     /// A derived value by its name.
@@ -234,6 +266,26 @@ mod tests {
         assert_eq!(sheet.value("age by CRL"), None);
         // The measured circumference counts, not the length of an ellipse's axis.
         assert!(Worksheet::of(Exam::Obstetric, &[length("HC", 60.0)]).lines.is_empty());
+    }
+
+    #[test]
+    fn typed_names_have_lines_and_each_value_its_measurement() {
+        let cyst = Measured { circumference: Some(60.0), area: Some(250.0), ..length("duct", 4.0) };
+        let all = [length("BPD", 46.0), length("mass", 12.0), length("LVIDd", 50.0), cyst];
+        let sheet = Worksheet::of(Exam::Obstetric, &[&all[..], &all[..1]].concat());
+        let lines: Vec<_> = sheet
+            .lines
+            .iter()
+            .map(|line| (line.name.as_str(), line.mean(), &*line.sources))
+            .collect();
+        let expected: [(&str, f64, &[usize]); 5] = [
+            ("BPD", 46.0, &[0, 4]),
+            ("mass", 12.0, &[1]),
+            ("duct", 4.0, &[3]),
+            ("duct", 60.0, &[3]),
+            ("duct", 2.5, &[3]),
+        ];
+        assert_eq!(lines, expected, "the heart's name waits for its examination");
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Kinds of examination, and the settings with which a machine begins each.
 
-use super::{Probe, Settings, words};
+use super::{Imaging, Probe, Settings, words};
 
 words! {
     /// The kind of an examination.
@@ -78,24 +78,40 @@ impl Exam {
         })
     }
 
+    /// The probe with the depth and focus of this examination; none of [`Self::General`].
+    pub fn probe(self) -> Option<Probe> {
+        let preset = self.preset()?;
+        Some(Probe { depth: preset.depth, focus: preset.focus, ..(preset.probe)() })
+    }
+
+    /// Image formation in this examination: of a scene file that names it, the values of the keys that it leaves out.
+    pub fn imaging(self) -> Imaging {
+        let mut out = Imaging { exam: self, ..Imaging::default() };
+        self.form(&mut out);
+        out
+    }
+
     /// Puts the settings of this examination in the place of the present ones. Counts of scanlines, layers and samples
     /// stay, noise and resolution too: they are the machine's, not the examination's.
     pub fn apply(self, settings: &mut Settings) {
         settings.imaging.exam = self;
-        let Some(preset) = self.preset() else { return };
+        let Some(probe) = self.probe() else { return };
         let (before, old) = (settings.probe.frequency, &settings.probe);
         settings.probe = Probe {
             scanlines: old.scanlines,
             elevation_layers: old.elevation_layers,
             samples: old.samples,
-            depth: preset.depth,
-            focus: preset.focus,
-            ..(preset.probe)()
+            ..probe
         };
         settings.follow_frequency(before);
-        let imaging = &mut settings.imaging;
+        settings.imaging.power = 0.0;
+        self.form(&mut settings.imaging);
+    }
+
+    /// Sets what its preset says of image formation.
+    fn form(self, imaging: &mut Imaging) {
+        let Some(preset) = self.preset() else { return };
         imaging.gain = preset.gain;
-        imaging.power = 0.0;
         imaging.dynamic_range = preset.dynamic_range;
         imaging.tgc_attenuation = preset.tgc_attenuation;
         imaging.tgc_sliders = preset.tgc_sliders;

@@ -8,8 +8,8 @@ const OFF: f64 = f64::NEG_INFINITY;
 group! {
     /// Image formation.
     pub struct Imaging in "imaging" {
-        /// The kind of examination: which measurements the window offers. Chosen in the window, it also sets probe and
-        /// imaging; here it sets nothing else.
+        /// The kind of examination: which measurements the window offers. Keys of `imaging` that the file leaves out
+        /// have the values of its preset, and so has the probe where `[probe]` names no `preset` (docs/exam.md).
         exam: Exam = Exam::General,
             Facts::word::<Exam>();
         /// An echo this far below a perfect mirror is white at the face.

@@ -7,7 +7,7 @@ use super::model::Model;
 use super::model::sheet::What;
 use super::state::State;
 use super::style::{self, button};
-use crate::exam::{Report, Worksheet};
+use crate::exam::{Line, Measured, Report, Worksheet};
 use crate::settings::Words as _;
 
 /// Width of the worksheet, points.
@@ -25,17 +25,19 @@ pub(super) struct Examination {
     findings: String,
 }
 
-/// The worksheet of the present measurements.
+/// The worksheet of all measurements, on the image and off it; its sources are places in [`Marks::iter`].
+///
+/// [`Marks::iter`]: super::model::sheet::Marks::iter
 fn worksheet(model: &Model) -> Worksheet {
-    let measured = model.sheet.marks().iter().filter_map(|mark| match &mark.what {
-        What::Caliper(caliper) => Some(caliper.measured()),
-        What::Note(_) => None,
+    let measured = model.sheet.all().iter().map(|mark| match &mark.what {
+        What::Caliper(caliper) => caliper.measured(),
+        What::Note(_) => Measured::default(),
     });
     Worksheet::of(model.settings.imaging.exam, &measured.collect::<Vec<_>>())
 }
 
 /// Draws the worksheet into a side panel.
-pub(super) fn show(ui: &mut Ui, model: &Model, state: &mut State) {
+pub(super) fn show(ui: &mut Ui, model: &mut Model, state: &mut State) {
     let sheet = worksheet(model);
     ui.add_space(6.0);
     ui.horizontal(|ui| {
@@ -43,12 +45,21 @@ pub(super) fn show(ui: &mut Ui, model: &Model, state: &mut State) {
         let ready = !state.tools.is_saving();
         if ui.add_enabled_ui(ready, |ui| button(ui, "Save report", tip)).inner {
             let report = report(model, &state.exam, sheet.clone());
-            state.tools.report(&model.title, report);
+            state.tools.report(model, report);
         }
+        let tip = "Remove all named measurements, on the image and off it; Undo brings them back";
+        let filled = !sheet.lines.is_empty();
+        if ui.add_enabled_ui(filled, |ui| button(ui, "Clear", tip)).inner {
+            model.sheet.strike_all();
+        }
+    });
+    ui.horizontal(|ui| {
         ui.label(RichText::new(format!("Worksheet: {}", model.settings.imaging.exam)).strong());
     });
     ScrollArea::vertical().auto_shrink([false; 2]).show(ui, |ui| {
-        values(ui, &sheet);
+        if let Some(place) = values(ui, &sheet) {
+            model.sheet.strike(place);
+        }
         ui.separator();
         let exam = &mut state.exam;
         Grid::new("exam").num_columns(2).show(ui, |ui| {
@@ -66,19 +77,15 @@ pub(super) fn show(ui: &mut Ui, model: &Model, state: &mut State) {
     });
 }
 
-fn values(ui: &mut Ui, sheet: &Worksheet) {
+/// Draws measured and derived values; returns the place of the measurement that the user removes.
+fn values(ui: &mut Ui, sheet: &Worksheet) -> Option<usize> {
     if sheet.lines.is_empty() {
         ui.small("Measure, and choose the name of the measurement in the list beside the image.");
     }
+    let mut struck = None;
     Grid::new("measured").num_columns(3).spacing([10.0, 3.0]).show(ui, |ui| {
         for line in &sheet.lines {
-            ui.label(line.item.name).on_hover_text(line.item.meaning);
-            ui.label(format!("{:.1} {}", line.mean(), line.item.quantity.unit()));
-            let all: Vec<String> = line.values.iter().map(|value| format!("{value:.1}")).collect();
-            if all.len() > 1 {
-                ui.label(RichText::new(all.join(", ")).small().color(style::FAINT));
-            }
-            ui.end_row();
+            struck = measured(ui, line).or(struck);
         }
         for one in &sheet.derived {
             let name = RichText::new(one.name).color(style::ACCENT);
@@ -87,6 +94,36 @@ fn values(ui: &mut Ui, sheet: &Worksheet) {
             ui.end_row();
         }
     });
+    struck
+}
+
+/// Draws one line: a value with its button, or the mean and below it each value with its button.
+fn measured(ui: &mut Ui, line: &Line) -> Option<usize> {
+    let unit = line.quantity.unit();
+    ui.label(&line.name).on_hover_text(line.meaning);
+    let several = line.values.len() > 1;
+    if several {
+        ui.label(format!("{:.1} {unit}", line.mean()));
+        ui.label(RichText::new(format!("mean of {}", line.values.len())).small());
+        ui.end_row();
+    }
+    let mut struck = None;
+    for (value, place) in line.values.iter().zip(&line.sources) {
+        let text = RichText::new(format!("{value:.1} {unit}"));
+        match several {
+            true => {
+                ui.label("");
+                ui.label(text.small().color(style::FAINT));
+            }
+            false => drop(ui.label(text)),
+        }
+        let tip = "Remove this measurement, from the image too; Undo brings it back";
+        if ui.small_button("x").on_hover_text(tip).clicked() {
+            struck = Some(*place);
+        }
+        ui.end_row();
+    }
+    struck
 }
 
 fn report(model: &Model, exam: &Examination, worksheet: Worksheet) -> Report {

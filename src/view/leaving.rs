@@ -59,7 +59,7 @@ impl Unsaved {
         Self {
             settings: whole && model.is_modified(state.files.with_pose),
             trajectory: recording || model.unsaved_trajectory().is_some(),
-            marks: if whole { state.tools.unfiled(model).len() } else { 0 },
+            marks: if whole { state.tools.unfiled(model).iter().count() } else { 0 },
         }
     }
 

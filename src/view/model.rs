@@ -47,7 +47,7 @@ use registration::Registration;
 pub use resuming::Leftover;
 pub use saving::File;
 pub use settings::Settings;
-use sheet::{Mark, Sheet};
+use sheet::{Marks, Sheet};
 use trajectory::Replay;
 pub use trajectory_state::{StoredTrajectory, TrajectoryState};
 pub use view3d::{Shown, View3d};
@@ -105,7 +105,7 @@ pub struct Model {
     /// Measurements and texts.
     pub sheet: Sheet,
     /// The marks at the last step of the history.
-    noted_marks: Vec<Mark>,
+    noted_marks: Marks,
     history: History,
     /// Number of times that it was saved.
     saves: u64,
@@ -213,7 +213,7 @@ impl Model {
             poses: KnownPose::of(&scene.poses),
             filed_poses: scene.poses.clone(),
             sheet: Sheet::default(),
-            noted_marks: Vec::new(),
+            noted_marks: Marks::default(),
             history: History::default(),
             saves: 0,
             revision: 0,
@@ -264,8 +264,11 @@ impl Model {
         }
     }
 
-    /// Stops or starts the image; the clock goes on from where it stopped.
+    /// Stops or starts the image; the clock goes on from where it stopped. Marks leave an image that goes live.
     pub fn freeze(&mut self, frozen: bool, now: Instant) {
+        if self.frozen && !frozen {
+            self.sheet.retire();
+        }
         self.frozen = frozen;
         self.follow(now);
         self.clock.hold(frozen, now);

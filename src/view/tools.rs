@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use super::captures::{Captures, Clip, Format, SavedStrip, Sidecar, Still};
 use super::engine::Frame;
 use super::model::cine::Limit;
-use super::model::sheet::{Mark, Moment, Sheet};
+use super::model::sheet::{Mark, Marks, Moment, Sheet};
 use super::model::sidecar;
 use super::model::{Axis, Cine, Model};
 use super::saved::Notices;
@@ -35,7 +35,7 @@ pub(super) struct Tools {
     /// The last images, all of one place in the probe's space: another depth begins another loop, as on a scanner.
     /// An image made finer at rest replaces its coarser one.
     pub(super) cine: Cine<Frame>,
-    /// The marks that the last saved image holds.
+    /// The marks that saved images and reports hold.
     filed: Vec<Mark>,
     /// Captures being saved.
     pub(super) captures: Captures,
@@ -152,12 +152,13 @@ impl Tools {
         self.due == Some(Wanted::Still) && !model.sheet.marks().is_empty()
     }
 
-    /// The marks that no saved image holds.
-    pub(super) fn unfiled<'m>(&self, model: &'m Model) -> &'m [Mark] {
-        match model.sheet.marks() {
-            marks if marks == self.filed => &[],
-            marks => marks,
-        }
+    /// The marks that no saved image and no report holds.
+    pub(super) fn unfiled(&self, model: &Model) -> Marks {
+        let open = |marks: &[Mark]| {
+            marks.iter().filter(|mark| !self.filed.contains(mark)).cloned().collect()
+        };
+        let Marks { shown, kept } = model.sheet.all();
+        Marks { shown: open(shown), kept: open(kept) }
     }
 
     /// Returns whether something is still to be saved, or being saved.
@@ -179,12 +180,12 @@ impl Tools {
             return;
         };
         let (folder, stem) = (self.folder.clone(), sidecar::stem(&model.title));
+        self.filed = model.sheet.all().iter().cloned().collect();
         match wanted {
             Wanted::Still => {
                 let mut sidecar = self.about(model, &frame);
                 sidecar.extend(settings(model, &frame, Some(&frame.pose)));
-                sidecar.extend(sidecar::marks(model.sheet.marks(), &frame.moment()));
-                self.filed = model.sheet.marks().to_vec();
+                sidecar.extend(sidecar::marks(model.sheet.all(), &[frame.moment()]));
                 let still = Still { frame, sidecar, marked, strip: strip() };
                 self.captures.still(folder, stem, still);
             }
@@ -228,6 +229,8 @@ impl Tools {
         sidecar.insert("speed".into(), self.cine.speed().into());
         sidecar.insert("frames".into(), times.into());
         sidecar.insert("settings".into(), all_settings.into());
+        let moments: Vec<Moment> = frames.iter().map(|(frame, _)| frame.moment()).collect();
+        sidecar.extend(sidecar::marks(model.sheet.all(), &moments));
         Clip { frames, sidecar, format: self.format, strip: None }
     }
 
@@ -285,8 +288,11 @@ impl Tools {
     }
 
     /// Saves a report with the stills of this session.
-    pub(super) fn report(&mut self, title: &str, report: Report) {
-        let stem = format!("{}-report", sidecar::stem(title));
+    pub(super) fn report(&mut self, model: &Model, report: Report) {
+        let stem = format!("{}-report", sidecar::stem(&model.title));
+        // Texts and what has no name are in no report.
+        let named = model.sheet.all().iter().filter(|mark| mark.is_named());
+        self.filed.extend(named.cloned());
         self.captures.report((self.folder.clone(), stem), report, self.stills().collect());
     }
 

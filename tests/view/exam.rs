@@ -1,6 +1,7 @@
 //! The examination: saved pictures without what is pressed, worksheet and report.
 
 use super::desk::{Desk, Key};
+use super::tools::sidecar;
 use super::{SCENE, brightness, difference};
 
 /// The tools at the lower left, where the image is not while it has the window for itself.
@@ -56,5 +57,52 @@ fn a_measured_still_has_no_buttons_and_stands_in_the_report() {
     for part in ["small parts", "Cyst and wires", "data:image/png;base64,", "0001-marked"] {
         assert!(text.contains(part), "{part}");
     }
+    desk.quit();
+}
+
+/// Pixels in the colour of the first mark.
+fn yellow(pixels: &[u8]) -> usize {
+    pixels.chunks_exact(3).filter(|p| p[0] > 200 && p[1] > 150 && p[2] < 120).count()
+}
+
+#[test]
+fn marks_leave_the_image_with_the_freeze_and_stay_on_the_worksheet() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let captures = folder.path().join("captures");
+    let arguments = ["--captures", captures.to_str().expect("UTF-8"), "--validate"];
+    let scene = SCENE.replace("[imaging]", "[imaging]\nexam = \"obstetric\"");
+    let Some(mut desk) = Desk::open(&scene, &arguments) else {
+        return;
+    };
+    desk.press(Key::Letter('c'));
+    desk.press(Key::Letter('v'));
+    desk.wait_for("an image", |d| brightness(&d.grab([500, 200, 300, 300])) > 10.0);
+    desk.press(Key::Space);
+    desk.press(Key::Letter('l'));
+    desk.drag((560, 250), (700, 350));
+    desk.wait_for("the measurement", |d| yellow(&d.grab(ALL)) > 20);
+    desk.still(ALL);
+    // The name is chosen from the list of the table.
+    desk.click((100, 78));
+    desk.still(ALL);
+    desk.click((100, 130));
+    desk.still(ALL);
+    desk.press(Key::F2);
+    let frozen = sidecar(&mut desk, &captures, "cyst-and-wires-0001.json");
+    assert_eq!(frozen["measurements"][0]["label"], "BPD");
+    assert_eq!(frozen["measurements"][0]["of_this_image"], true);
+    desk.press(Key::Space);
+    desk.wait_for("the marks to leave", |d| yellow(&d.grab(ALL)) < 20);
+    desk.press(Key::F2);
+    let live = sidecar(&mut desk, &captures, "cyst-and-wires-0002.json");
+    assert_eq!(live["measurements"].as_array().map(Vec::len), Some(0));
+    assert_eq!(live["worksheet"][0]["length_mm"], frozen["measurements"][0]["length_mm"]);
+    // Its row in the worksheet has a button that removes it.
+    desk.press(Key::Letter('x'));
+    desk.still(ALL);
+    desk.click((151, 60));
+    desk.press(Key::F2);
+    let removed = sidecar(&mut desk, &captures, "cyst-and-wires-0003.json");
+    assert_eq!(removed["worksheet"].as_array().map(Vec::len), Some(0));
     desk.quit();
 }

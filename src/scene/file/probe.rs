@@ -7,7 +7,7 @@ use super::error::SceneError;
 use super::table::Stated;
 use crate::probe::Probe;
 use crate::settings::units::LENGTH;
-use crate::settings::{Form, Group, Value, group, suggest};
+use crate::settings::{Exam, Form, Group, Value, group, suggest};
 
 /// Lateral and depth axes nearer to parallel than this (sine) define no image plane.
 const PARALLEL: f64 = 1e-3;
@@ -16,7 +16,7 @@ const INF: f64 = f64::INFINITY;
 group! {
     /// The preset of a probe, which other keys change.
     pub struct PresetKey in "probe" {
-        /// One of the presets in the table below.
+        /// One of the presets in the table below. Without it, the probe of `imaging.exam` where that names one.
         preset: String = "paper-table1".to_owned(), Facts::of(Form::Text);
     }
 }
@@ -33,17 +33,30 @@ group! {
     }
 }
 
-pub(super) fn build(document: &Document<'_>, stated: &Stated) -> Result<Probe, SceneError> {
+/// The probe that a file states; what it leaves out is as in the preset that it names, else as in its examination.
+pub(super) fn build(
+    document: &Document<'_>,
+    stated: &Stated,
+    exam: Exam,
+) -> Result<Probe, SceneError> {
+    let mut out = match exam.probe() {
+        Some(probe) if !stated.has("preset") => probe,
+        _ => named(document, stated)?,
+    };
+    arrange(document, stated, &mut out)?;
+    stated.put("", &mut out);
+    Ok(out)
+}
+
+/// The preset that a file names, or the default one.
+fn named(document: &Document<'_>, stated: &Stated) -> Result<Probe, SceneError> {
     let PresetKey { preset } = stated.get("");
     let presets = &Probe::PRESETS;
     let make = presets.iter().find(|p| p.0 == preset).ok_or_else(|| {
         let remedy = suggest::among(&preset, presets.iter().map(|p| p.0));
         document.fail("probe.preset", format!("unknown preset `{preset}`"), remedy)
     })?;
-    let mut out = make.1();
-    arrange(document, stated, &mut out)?;
-    stated.put("", &mut out);
-    Ok(out)
+    Ok(make.1())
 }
 
 /// Sets the arrangement that is stated in `out`, which holds the preset. Keys of another arrangement are refused,

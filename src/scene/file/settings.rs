@@ -9,19 +9,23 @@ use super::table::entries;
 use super::{presentable, probe};
 use crate::settings::{Group, Imaging, Probe, Settings, Simulation};
 
-/// The settings stated in the tables `probe`, `simulation` and `imaging` of `file`. Defaults of `simulation` that
+/// The settings stated in the tables `probe`, `simulation` and `imaging` of `file`; what it leaves out is as the
+/// examination that it names has it. Defaults of `simulation` that
 /// follow the frequency are those of a probe of `frequency` MHz, or without it of the file's probe.
 pub(super) fn settings(
     document: &Document<'_>,
     file: &File,
     frequency: Option<f64>,
 ) -> Result<Settings, SceneError> {
-    let probe = probe::build(document, &file.probe.stated)?;
+    let Imaging { exam, .. } = file.imaging.stated.get("");
+    let probe = probe::build(document, &file.probe.stated, exam)?;
     let cell = Simulation::default_cell(frequency.unwrap_or(probe.frequency));
     let mut simulation = Simulation { cell, ..Simulation::default() };
     file.simulation.stated.put("", &mut simulation);
     simulation.cell /= simulation.crowding();
-    Ok(Settings { probe, simulation, imaging: file.imaging.stated.get("") })
+    let mut imaging = exam.imaging();
+    file.imaging.stated.put("", &mut imaging);
+    Ok(Settings { probe, simulation, imaging })
 }
 
 /// Takes those of `settings` over from a scene file of which it has a table - `[probe]`, `[simulation]`, `[imaging]` -
@@ -115,7 +119,7 @@ pub fn put_settings(pairs: &[(String, String)], settings: &mut Settings) -> Resu
 mod tests {
     use super::load_settings;
     use crate::scene::file::tests::Case;
-    use crate::settings::{Imaging, Probe, Settings, Simulation};
+    use crate::settings::{Exam, Imaging, Probe, Settings, Simulation};
 
     /// Unlike the defaults everywhere.
     fn own() -> Settings {
@@ -150,6 +154,33 @@ mod tests {
         assert_eq!(found.probe, Probe::phased());
         assert_eq!(found.simulation.cell, 0.3 * 5.0 / 2.7);
         assert_eq!(found.imaging, own().imaging);
+    }
+
+    #[test]
+    fn what_a_file_leaves_out_is_as_its_examination_has_it() {
+        let case = Case::new();
+        let read = |text: &str| {
+            let scene = case.load(text, &[]).expect("sound").0;
+            (scene.settings.probe, scene.settings.imaging)
+        };
+        // Everything, where the file says nothing else.
+        let mut cardiac = Settings::of(Probe::paper_table1());
+        Exam::Cardiac.apply(&mut cardiac);
+        let (probe, imaging) = read("[imaging]\nexam = \"cardiac\"\n");
+        assert_eq!((&probe, &imaging), (&cardiac.probe, &cardiac.imaging));
+        // What the file says counts, though it be the default elsewhere.
+        let (probe, imaging) = read(
+            "[probe]\ndepth = 90\n[imaging]\nexam = \"cardiac\"\ngain = 7\ndynamic_range = 60\n",
+        );
+        assert_eq!(probe, Probe { depth: 90.0, ..cardiac.probe.clone() });
+        let stated = Imaging { gain: 7.0, dynamic_range: 60.0, ..cardiac.imaging.clone() };
+        assert_eq!(imaging, stated);
+        // A named probe has its own depth and focus.
+        let (probe, imaging) =
+            read("[probe]\npreset = \"linear\"\n[imaging]\nexam = \"cardiac\"\n");
+        assert_eq!((probe, imaging), (Probe::linear(), cardiac.imaging));
+        let plain = read("[imaging]\nexam = \"general\"\n");
+        assert_eq!(plain, (Probe::paper_table1(), Imaging::default()));
     }
 
     #[test]

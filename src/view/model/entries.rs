@@ -9,7 +9,7 @@ use crate::scene::file::{self, Entry, quoted};
 use crate::scene::{Origin, Origins};
 use crate::settings::Value::Number;
 use crate::settings::{
-    Display, Fusion, Group, Imaging, Live, Probe, Simulation, Surface, Tissue, plain,
+    Display, Exam, Fusion, Group, Live, Probe, Simulation, Surface, Tissue, plain,
 };
 
 /// Path of the edge of a lattice cell, which follows from other settings.
@@ -28,11 +28,12 @@ pub(super) fn changes(
     origins: &Origins,
     lattice: f64,
 ) -> Vec<Entry> {
-    let mut out = probe_changes(&from.probe, &to.probe);
+    let exam = (from.imaging.exam != to.imaging.exam).then_some(to.imaging.exam);
+    let mut out = probe_changes(&from.probe, &to.probe, exam);
     let simulation = file::changes(&from.simulation, &to.simulation, Simulation::TABLE);
     out.extend(simulation.into_iter().filter(|(path, _)| path != CELL));
     out.extend(cell(from, to, lattice));
-    out.extend(file::changes(&from.imaging, &to.imaging, Imaging::TABLE));
+    out.extend(changes_with(&from.imaging, &to.imaging, exam.map(Exam::imaging)));
     out.extend(file::changes(&from.live, &to.live, Live::TABLE));
     if let (Some(from), Some(to)) = (&from.fusion, &to.fusion) {
         out.extend(fusion_changes(from, to, origins));
@@ -121,12 +122,26 @@ fn cell(from: &Settings, to: &Settings, file: f64) -> Option<Entry> {
     Some((CELL.into(), text.flatten().filter(|_| !is_same_lattice(value, default))))
 }
 
-fn probe_changes(from: &Probe, to: &Probe) -> Vec<Entry> {
-    if from == to {
+/// Entries by which the table of `T`, which gives `from` now, gives `to`. `fresh` is what keys that the file does not
+/// state become where another examination is written into it: which they are is not known here.
+fn changes_with<T: Group>(from: &T, to: &T, fresh: Option<T>) -> Vec<Entry> {
+    let entries = |of: &T| file::entries(of, T::TABLE);
+    let mut out = file::changes(from, to, T::TABLE);
+    for entry in fresh.map_or(Vec::new(), |fresh| file::differing(entries(&fresh), entries(to))) {
+        if !out.contains(&entry) {
+            out.push(entry);
+        }
+    }
+    out
+}
+
+fn probe_changes(from: &Probe, to: &Probe, exam: Option<Exam>) -> Vec<Entry> {
+    if from == to && exam.is_none() {
         return Vec::new();
     }
     let Some((preset, _)) = Probe::PRESETS.iter().find(|(_, make)| make() == *to) else {
-        return file::changes(from, to, Probe::TABLE);
+        let fresh = exam.map(|exam| exam.probe().unwrap_or_else(Probe::paper_table1));
+        return changes_with(from, to, fresh);
     };
     let keys = file::entries(to, Probe::TABLE);
     let mut out: Vec<Entry> = keys.into_iter().map(|(path, _)| (path, None)).collect();

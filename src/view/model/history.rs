@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use glam::DAffine3;
 
-use super::sheet::Mark;
+use super::sheet::Marks;
 use super::{KnownPose, Model, Settings, Source, StoredTrajectory, entries};
 
 /// Changes of one thing that follow each other faster count as one: the drag of a slider, a pressed key.
@@ -21,7 +21,7 @@ pub(super) enum Step {
     /// The named poses.
     Poses(Vec<KnownPose>),
     /// Measurements and texts.
-    Marks(Vec<Mark>),
+    Marks(Marks),
     /// The recorded or loaded trajectory.
     Trajectory(Option<StoredTrajectory>),
 }
@@ -102,12 +102,13 @@ impl Model {
 
     /// Notes that marks were made, moved or removed; not before a drag or a text has ended.
     pub fn note_marks(&mut self, now: Instant) {
-        if self.sheet.is_busy() || self.sheet.marks() == self.noted_marks {
+        if self.sheet.is_busy() || *self.sheet.all() == self.noted_marks {
             return;
         }
-        let marks = self.sheet.marks().to_vec();
+        let marks = self.sheet.all().clone();
         // Keys move a point by a pixel at a time.
-        let moved = marks.len() == self.noted_marks.len();
+        let counts = |marks: &Marks| [marks.shown.len(), marks.kept.len()];
+        let moved = counts(&marks) == counts(&self.noted_marks);
         let of = moved.then(|| "marks".to_owned()).into_iter().collect();
         let before = std::mem::replace(&mut self.noted_marks, marks);
         self.history.push(Step::Marks(before), of, now);

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use super::sheet::Mark;
+use super::sheet::Marks;
 use super::trajectory::Recording;
 use super::{KnownPose, Model, Settings, Source, StoredTrajectory};
 use crate::settings::Group;
@@ -11,17 +11,17 @@ use crate::settings::Group;
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Leftover {
     /// Measurements and texts.
-    pub marks: Vec<Mark>,
+    pub marks: Marks,
     /// The trajectory that was recorded.
     pub recording: Option<Recording>,
 }
 
 impl Leftover {
     /// What of a session is in no file; `marks` are those of no saved image.
-    pub fn of(model: &Model, marks: &[Mark], now: Instant) -> Self {
+    pub fn of(model: &Model, marks: Marks, now: Instant) -> Self {
         let under_way = model.trajectory.recorder.clone().map(|recorder| recorder.finish(now));
         let ended = model.unsaved_trajectory().and_then(|stored| stored.unsaved.clone());
-        Self { marks: marks.to_vec(), recording: under_way.or(ended) }
+        Self { marks, recording: under_way.or(ended) }
     }
 }
 
@@ -94,7 +94,7 @@ impl Model {
             self.set_poses(poses, now);
         }
         self.place_probe(Source::Keyboard, from.home, now);
-        if !left.marks.is_empty() {
+        if left.marks != Marks::default() {
             self.sheet.put(left.marks);
             self.note_marks(now);
         }
@@ -238,7 +238,8 @@ mod tests {
         left.add_pose("b", now);
         left.record(now);
         left.move_probe(Axis::Rock, 0.1, now);
-        let text = serde_json::to_string(&Leftover::of(&left, &[], now)).expect("written");
+        let text =
+            serde_json::to_string(&Leftover::of(&left, Marks::default(), now)).expect("written");
         let draft = folder.path().join("draft.toml");
         crate::scene::file::save(&path, &draft, &left.changes(true)).expect("saved");
         let text_of = std::fs::read_to_string(&draft).expect("there");
@@ -253,7 +254,7 @@ mod tests {
         (0..9).for_each(|_| model.undo(now));
         assert!(!model.is_modified(false) && model.unsaved_trajectory().is_none());
         let other = of(&path, &TEXT.replace("\"liver\"\n[", "\"fat\"\n["));
-        let left = Leftover { marks: Vec::new(), recording: None };
+        let left = Leftover { marks: Marks::default(), recording: None };
         assert!(!model.restore(&other, left, now));
     }
 }

@@ -1,9 +1,11 @@
 //! The marks on the image, measurements and texts: the pointer makes, moves and removes them.
 
-use glam::{DAffine3, DVec2};
-use serde::{Deserialize, Serialize};
+mod mark;
+
+use glam::DVec2;
 
 use super::calipers::{Caliper, Kind};
+pub use mark::{Mark, Marks, Moment, Note, What};
 
 /// The pointer's tool on the image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -12,64 +14,6 @@ pub enum Tool {
     Measure(Kind),
     /// Places a text.
     Note,
-}
-
-/// A text on the image.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Note {
-    /// The text.
-    pub text: String,
-    /// Its left edge at half its height, mm lateral and mm deep.
-    pub at: DVec2,
-    /// Point that its arrow shows, mm.
-    pub arrow: Option<DVec2>,
-}
-
-/// The pose and the time of an image.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Moment {
-    /// World from probe.
-    pub pose: DAffine3,
-    /// Time of the scene, s.
-    pub seconds: f64,
-}
-
-/// Content of a mark.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub enum What {
-    /// A measurement.
-    Caliper(Caliper),
-    /// A text.
-    Note(Note),
-}
-
-/// A measurement or text, with the image on which it was put.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Mark {
-    /// Its letter, `A` to `Z`.
-    pub letter: char,
-    /// Its content.
-    pub what: What,
-    /// Pose and time of its image.
-    pub of: Moment,
-}
-
-impl Mark {
-    /// Points that the pointer can take, mm.
-    pub fn points(&self) -> Vec<DVec2> {
-        match &self.what {
-            What::Caliper(caliper) => caliper.points.clone(),
-            What::Note(note) => [note.at].into_iter().chain(note.arrow).collect(),
-        }
-    }
-
-    fn drag(&mut self, point: usize, to: DVec2) {
-        match &mut self.what {
-            What::Caliper(caliper) => caliper.drag(point, to),
-            What::Note(note) if point == 0 => note.at = to,
-            What::Note(note) => note.arrow = Some(to),
-        }
-    }
 }
 
 /// The tool whose points are as many as the user likes.
@@ -93,7 +37,7 @@ pub struct Draft {
 /// All marks, and the state of the pointer.
 #[derive(Default)]
 pub struct Sheet {
-    marks: Vec<Mark>,
+    all: Marks,
     tool: Option<Tool>,
     draft: Option<Draft>,
     /// Last position of the pointer, mm.
@@ -109,15 +53,44 @@ pub struct Sheet {
 }
 
 impl Sheet {
-    /// All marks, in the order of their making.
+    /// The marks on the image, in the order of their making.
     pub fn marks(&self) -> &[Mark] {
-        &self.marks
+        &self.all.shown
+    }
+
+    /// The marks on the image, and what the worksheet has of earlier ones.
+    pub fn all(&self) -> &Marks {
+        &self.all
     }
 
     /// Puts other marks in the place of these, which are returned; the tool stays.
-    pub fn put(&mut self, marks: Vec<Mark>) -> Vec<Mark> {
+    pub fn put(&mut self, all: Marks) -> Marks {
         let tool = self.tool;
-        std::mem::replace(self, Self { tool, marks, ..Self::default() }).marks
+        std::mem::replace(self, Self { tool, all, ..Self::default() }).all
+    }
+
+    /// Takes all marks off the image, as scanners do when the image goes live. Measurements with a name stay for the
+    /// worksheet: the report has those of several images.
+    pub fn retire(&mut self) {
+        self.stop_editing();
+        let Marks { shown, mut kept } = std::mem::take(&mut self.all);
+        kept.extend(shown.into_iter().filter(Mark::is_named));
+        self.put(Marks { shown: Vec::new(), kept });
+    }
+
+    /// Removes a mark by its place in [`Marks::iter`], on the image or not.
+    pub fn strike(&mut self, place: usize) {
+        match place.checked_sub(self.all.kept.len()) {
+            Some(shown) => self.remove(shown),
+            None => drop(self.all.kept.remove(place)),
+        }
+    }
+
+    /// Removes all named measurements, on the image and off it.
+    pub fn strike_all(&mut self) {
+        let Marks { mut shown, .. } = std::mem::take(&mut self.all);
+        shown.retain(|mark| !mark.is_named());
+        self.put(Marks { shown, kept: Vec::new() });
     }
 
     /// Returns whether a mark is being dragged or its text typed.
@@ -167,7 +140,7 @@ impl Sheet {
 
     /// Selects a mark by its last point.
     pub fn select(&mut self, mark: usize) {
-        if let Some(found) = self.marks.get(mark) {
+        if let Some(found) = self.all.shown.get(mark) {
             self.selected = Some((mark, found.points().len() - 1));
         }
     }
@@ -182,7 +155,7 @@ impl Sheet {
         let (mark, point) = handle;
         self.stop_editing();
         self.selected = Some(handle);
-        self.held = Some(self.marks[mark].points()[point] - at);
+        self.held = Some(self.all.shown[mark].points()[point] - at);
     }
 
     /// Handles the button going down at a place, mm; a point within `reach` mm of it is meant.
@@ -214,7 +187,7 @@ impl Sheet {
     pub fn motion(&mut self, at: DVec2) {
         self.pointer = at;
         if let (Some(apart), Some((mark, point))) = (self.held, self.selected) {
-            self.marks[mark].drag(point, at + apart);
+            self.all.shown[mark].drag(point, at + apart);
         }
         if let (Some(step), Some(draft)) = (self.tracing, &mut self.draft)
             && draft.points[draft.points.len() - 1].distance(at) > step
@@ -255,7 +228,7 @@ impl Sheet {
             Tool::Measure(kind) => What::Caliper(Caliper::new(kind, draft.points.clone())),
             Tool::Note => {
                 let tip = draft.points[0];
-                self.editing = Some(self.marks.len());
+                self.editing = Some(self.all.shown.len());
                 // A click places the text itself, a drag moves the text away from its arrow's tip.
                 let arrow = (tip != at).then_some(tip);
                 let text = String::new();
@@ -281,20 +254,20 @@ impl Sheet {
     fn finish(&mut self, what: What) {
         let Some(draft) = self.draft.take() else { return };
         let letter = self.letter();
-        self.marks.push(Mark { letter, what, of: draft.of });
-        self.select(self.marks.len() - 1);
+        self.all.shown.push(Mark { letter, what, of: draft.of });
+        self.select(self.all.shown.len() - 1);
     }
 
     /// The first letter that no mark has.
     fn letter(&self) -> char {
         let mut letters = 'A'..='Z';
-        let free = letters.find(|letter| self.marks.iter().all(|m| m.letter != *letter));
+        let free = letters.find(|letter| self.all.shown.iter().all(|m| m.letter != *letter));
         free.unwrap_or('Z')
     }
 
     /// The point nearest to a place, within `reach` mm.
     pub fn near(&self, at: DVec2, reach: f64) -> Option<Handle> {
-        let points = self.marks.iter().enumerate().flat_map(|(index, mark)| {
+        let points = self.all.shown.iter().enumerate().flat_map(|(index, mark)| {
             let points = mark.points().into_iter().enumerate();
             points.map(move |(point, place)| ((index, point), place.distance(at)))
         });
@@ -308,8 +281,8 @@ impl Sheet {
         let Some((mark, point)) = self.selected else {
             return false;
         };
-        let to = self.marks[mark].points()[point] + by;
-        self.marks[mark].drag(point, to);
+        let to = self.all.shown[mark].points()[point] + by;
+        self.all.shown[mark].drag(point, to);
         true
     }
 
@@ -339,17 +312,18 @@ impl Sheet {
     /// Removes a mark.
     pub fn remove(&mut self, mark: usize) {
         (self.selected, self.editing, self.held) = (None, None, None);
-        self.marks.remove(mark);
+        self.all.shown.remove(mark);
     }
 
-    /// Removes all marks.
+    /// Removes all marks on the image.
     pub fn clear(&mut self) {
-        self.put(Vec::new());
+        let kept = std::mem::take(&mut self.all.kept);
+        self.put(Marks { shown: Vec::new(), kept });
     }
 
     /// Names a measurement, or sets the text of a note.
     pub fn set_text(&mut self, mark: usize, text: String) {
-        match &mut self.marks[mark].what {
+        match &mut self.all.shown[mark].what {
             What::Caliper(caliper) => caliper.label = text,
             What::Note(note) => note.text = text,
         }
@@ -367,7 +341,7 @@ impl Sheet {
         let Some(mark) = self.editing.take() else {
             return;
         };
-        if let What::Note(note) = &self.marks[mark].what
+        if let What::Note(note) = &self.all.shown[mark].what
             && note.text.trim().is_empty()
         {
             self.remove(mark);

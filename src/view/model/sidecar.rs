@@ -2,41 +2,55 @@
 
 use serde_json::{Map, Value, json};
 
-use super::calipers::Reading;
-use super::sheet::{Mark, Moment, What};
+use super::calipers::{Caliper, Reading};
+use super::sheet::{Marks, Moment, What};
 
-/// Measurements and texts on the picture of a moment, under the keys `measurements` and `texts`. Each
-/// says whether it was put on this picture or on another one.
-pub fn marks(marks: &[Mark], moment: &Moment) -> Map<String, Value> {
+/// Measurements and texts of saved images, under the keys `measurements`, `texts`, and `worksheet` for named
+/// measurements that have left the image. `moments` are those of the images: each mark on the image says whether it was
+/// put on one of these; of several, on which.
+pub fn marks(all: &Marks, moments: &[Moment]) -> Map<String, Value> {
     let (mut measurements, mut texts) = (Vec::new(), Vec::new());
-    for mark in marks {
-        let here = mark.of == *moment;
+    for mark in &all.shown {
+        let place = moments.iter().position(|moment| *moment == mark.of);
+        let here = match moments.len() {
+            1 => ("of_this_image", json!(place.is_some())),
+            _ => ("of_frame", json!(place)),
+        };
         match &mark.what {
             What::Caliper(caliper) => {
-                let points: Vec<_> = caliper.points.iter().map(|p| p.to_array()).collect();
-                let mut entry = json!({
-                    "letter": mark.letter,
-                    "kind": caliper.kind.name(),
-                    "label": caliper.label,
-                    "points_mm": points,
-                    "of_this_image": here,
-                });
-                let entry_map = entry.as_object_mut().expect("made as one");
-                entry_map.extend(values(&caliper.reading()));
-                measurements.push(entry);
+                let mut entry = measurement(mark.letter, caliper);
+                entry.insert(here.0.into(), here.1);
+                measurements.push(Value::Object(entry));
             }
             What::Note(note) => texts.push(json!({
                 "text": note.text,
                 "at_mm": note.at.to_array(),
                 "arrow_mm": note.arrow.map(|tip| tip.to_array()),
-                "of_this_image": here,
+                (here.0): here.1,
             })),
         }
     }
+    let earlier = all.kept.iter().filter_map(|mark| match &mark.what {
+        What::Caliper(caliper) => Some(Value::Object(measurement(mark.letter, caliper))),
+        What::Note(_) => None,
+    });
     let mut out = Map::new();
     out.insert("measurements".into(), Value::Array(measurements));
     out.insert("texts".into(), Value::Array(texts));
+    out.insert("worksheet".into(), earlier.collect());
     out
+}
+
+fn measurement(letter: char, caliper: &Caliper) -> Map<String, Value> {
+    let points: Vec<_> = caliper.points.iter().map(|p| p.to_array()).collect();
+    let head = [
+        ("letter", json!(letter)),
+        ("kind", json!(caliper.kind.name())),
+        ("label", json!(caliper.label)),
+        ("points_mm", json!(points)),
+    ];
+    let head = head.into_iter().map(|(key, value)| (key.to_owned(), value));
+    head.chain(values(&caliper.reading())).collect()
 }
 
 fn values(reading: &Reading) -> Map<String, Value> {
@@ -74,7 +88,7 @@ mod tests {
     use serde_json::json;
 
     use super::super::calipers::{Caliper, Kind};
-    use super::super::sheet::{Mark, Moment, Note, What};
+    use super::super::sheet::{Mark, Marks, Moment, Note, What};
     use super::{marks, stem};
     use crate::sim::facts::pose;
 
@@ -114,7 +128,8 @@ mod tests {
             },
             Mark { letter: 'B', what: What::Note(note), of: later },
         ];
-        let said = marks(&all, &moment);
+        let all = Marks { kept: all[..1].to_vec(), shown: all.to_vec() };
+        let said = marks(&all, &[moment]);
         let expected = json!([{
             "letter": "A", "kind": "distance", "label": "BPD",
             "points_mm": [[0.0, 0.0], [3.0, 4.0]],
@@ -124,6 +139,12 @@ mod tests {
         assert_eq!(said["measurements"], expected);
         assert_eq!(said["texts"][0]["text"], "vessel");
         assert_eq!(said["texts"][0]["of_this_image"], false);
+        let earlier = &said["worksheet"][0];
+        assert_eq!((&earlier["label"], &earlier["length_mm"]), (&json!("BPD"), &json!(5.0)));
+        assert_eq!(earlier["of_this_image"], json!(null));
+        let said = marks(&all, &[later, moment]);
+        assert_eq!(said["measurements"][0]["of_frame"], 1);
+        assert_eq!(said["texts"][0]["of_frame"], 0);
         assert_eq!(pose(&moment.pose)["position_mm"], json!([1.0, 2.0, 3.0]));
         assert_eq!(pose(&moment.pose)["depth"], json!([0.0, 0.0, 1.0]));
     }

@@ -201,3 +201,58 @@ fn every_change_is_a_new_revision_and_nothing_else_is() {
     assert!(changed(&model));
     assert_eq!(model.order().revision, model.revision());
 }
+
+#[test]
+fn marks_leave_an_image_that_goes_live_and_named_ones_stay_for_the_worksheet() {
+    use super::calipers::Kind;
+    use super::sheet::Tool;
+    let now = Instant::now();
+    let mut model = model(now);
+    let measure = |model: &mut Model, name: &str| {
+        let moment = super::sheet::Moment { pose: model.pose, seconds: 0.0 };
+        model.sheet.take(Some(Tool::Measure(Kind::Distance)));
+        // Away from the marks that are there, which the pointer would take.
+        let depth = 10.0 * (1 + model.sheet.all().iter().count()) as f64;
+        model.sheet.press(glam::dvec2(0.0, depth), 1.0, moment);
+        model.sheet.release(glam::dvec2(30.0, depth), 1.0);
+        model.sheet.set_text(model.sheet.marks().len() - 1, name.into());
+        model.note_marks(now);
+    };
+    model.freeze(true, now);
+    measure(&mut model, "BPD");
+    measure(&mut model, "");
+    model.freeze(false, now);
+    model.note_marks(now);
+    let counts = |model: &Model| [model.sheet.marks().len(), model.sheet.all().kept.len()];
+    assert_eq!(counts(&model), [0, 1], "the image is clear, BPD is on the worksheet");
+    model.undo(now);
+    assert_eq!(counts(&model), [2, 0]);
+    model.redo(now);
+    // The next freeze adds to it, and what is removed comes back.
+    model.freeze(true, now);
+    measure(&mut model, "AC");
+    assert_eq!(counts(&model), [1, 1]);
+    model.sheet.strike(0);
+    assert_eq!(counts(&model), [1, 0]);
+    model.note_marks(now);
+    model.undo(now);
+    model.sheet.strike(1);
+    assert_eq!(counts(&model), [0, 1]);
+    model.note_marks(now);
+    model.undo(now);
+    model.sheet.clear();
+    assert_eq!(counts(&model), [0, 1], "the bin clears the image alone");
+    model.note_marks(now);
+    model.undo(now);
+    model.sheet.strike_all();
+    assert_eq!(counts(&model), [0, 0]);
+    model.note_marks(now);
+    // Freezing again, and a live image that is told to stay live, take nothing away.
+    measure(&mut model, "FL");
+    model.freeze(true, now);
+    assert_eq!(counts(&model), [1, 0]);
+    model.freeze(false, now);
+    measure(&mut model, "HL");
+    model.freeze(false, now);
+    assert_eq!(counts(&model), [1, 1]);
+}

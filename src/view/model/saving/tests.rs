@@ -296,3 +296,32 @@ fn settings_of_another_file_are_taken_and_undone() {
     assert_eq!(error.line, 2);
     assert_eq!(model.settings, before);
 }
+
+/// What a file does not state follows its examination: another one, saved, must not move what was set since.
+#[test]
+fn another_examination_is_saved_with_what_was_set_since() {
+    use crate::settings::Exam;
+    let folder = tempfile::tempdir().expect("a folder");
+    let (path, now) = (folder.path().join("scene.toml"), Instant::now());
+    let load = || {
+        let (scene, _) = Scene::load(&path, &[]).expect("sound");
+        Model::new(&scene, File::new(path.clone(), Vec::new(), &scene), Tracer::Bvh, 0.0, now)
+    };
+    let begun =
+        ["", "[probe]\npreset = \"linear\"\n", "[imaging]\nexam = \"obstetric\"\ngain = 3\n"];
+    for text in begun {
+        for exam in [Exam::Cardiac, Exam::Vascular, Exam::General] {
+            std::fs::write(&path, format!("name = \"a\"\n{text}")).expect("written");
+            let mut model = load();
+            exam.apply(&mut model.settings);
+            // As they were before, or as they are by default: neither is what the examination has.
+            model.settings.imaging.dynamic_range = model.loaded.imaging.dynamic_range;
+            model.settings.imaging.grey_gamma = 1.0;
+            model.settings.probe.frequency = model.loaded.probe.frequency;
+            model.save(None, false).expect("saved");
+            let again = load();
+            assert_eq!(again.settings.imaging, model.settings.imaging, "{exam}: {text}");
+            assert_eq!(again.settings.probe, model.settings.probe, "{exam}: {text}");
+        }
+    }
+}
