@@ -230,8 +230,10 @@ fn mediastinum(p: &Point) -> Tree {
     let vessels = cone(p, at(-8.0, -20.0, 80.0), 34.0, at(0.0, 10.0, 190.0), 30.0);
     let behind = elliptic_cylinder(&p.from(at(6.0, 58.0, 0.0)), 34.0, 36.0);
     let notch = cone(p, at(38.0, -118.0, 40.0), 36.0, at(24.0, -60.0, 34.0), 62.0);
+    // Fat in the angle between heart and diaphragm.
+    let angle = cone(p, at(-24.0, -88.0, -24.0), 30.0, at(-38.0, -44.0, 8.0), 40.0);
     let edge = cone(p, at(2.0, -124.0, 30.0), 16.0, at(2.0, -124.0, 170.0), 8.0);
-    union_all(vec![pericardium(p), vessels, behind, notch, edge], 12.0)
+    union_all(vec![pericardium(p), vessels, behind, notch, angle, edge], 12.0)
 }
 
 /// Domes of the diaphragm, extended downwards; the middle carries the heart.
@@ -242,7 +244,7 @@ fn dome(p: &Point) -> Tree {
     };
     let right = shaft(Vec3::new(-72.0, 0.0, -80.0), Vec3::new(90.0, 112.0, 96.0));
     let left = shaft(Vec3::new(74.0, 14.0, -90.0), Vec3::new(84.0, 100.0, 84.0));
-    let middle = shaft(Vec3::new(0.0, -8.0, -90.0), Vec3::new(90.0, 112.0, 66.0));
+    let middle = shaft(Vec3::new(0.0, -40.0, -90.0), Vec3::new(90.0, 112.0, 66.0));
     let whole = union(union(right, left, 30.0), middle, 25.0);
     difference(whole, pericardium(p), 8.0)
 }
@@ -262,7 +264,8 @@ fn liver(p: &Point) -> Tree {
 fn lungs(p: &Point) -> Tree {
     let top = half_space(p, Vec3::new(0.0, 0.0, 150.0), Vec3::Z);
     let room = intersection(inside(p) + 1.0, top, 40.0);
-    let recess = half_space(p, Vec3::new(0.0, 0.0, -70.0), Vec3::NEG_Z);
+    // Lower borders: sixth rib in front, eighth at the side, tenth behind.
+    let recess = half_space(p, Vec3::new(0.0, -TORSO.1, 0.0), Vec3::new(0.0, -0.45, -1.0));
     let above = difference(intersection(room, recess, 20.0), dome(p) + 1.4, 8.0);
     difference(above, mediastinum(p), 10.0)
 }

@@ -34,7 +34,7 @@ const WINDOWS: [Window; 4] = [
         // Anterior wall on the right.
         "apical two-chamber",
         Vec3::ZERO,
-        Vec3::new(-9.0, 0.0, 75.0),
+        Vec3::new(1.0, 2.0, 128.0),
         Vec3::new(0.0, -1.0, 0.0),
     ),
     (
