@@ -25,6 +25,8 @@ mod beat;
 mod body;
 #[path = "anatomy/check.rs"]
 mod check;
+#[path = "anatomy/chest.rs"]
+mod chest;
 #[path = "anatomy/decimate.rs"]
 mod decimate;
 #[path = "anatomy/early.rs"]
@@ -39,6 +41,8 @@ mod fetus;
 mod fetus_scene;
 #[path = "anatomy/field.rs"]
 mod field;
+#[path = "anatomy/figure.rs"]
+mod figure;
 #[path = "anatomy/heart.rs"]
 mod heart;
 #[path = "anatomy/heart_scene.rs"]
@@ -69,6 +73,8 @@ mod vaginal;
 mod valves;
 #[path = "anatomy/vessels.rs"]
 mod vessels;
+#[path = "anatomy/windows.rs"]
+mod windows;
 #[path = "anatomy/womb.rs"]
 mod womb;
 

@@ -15,9 +15,9 @@ use crate::field::{
 use crate::model::Extent;
 use crate::part::{Part, part};
 
-/// The box that holds the heart and the modelled part of the chest.
+/// The box that holds the heart.
 pub const EXTENT: Extent =
-    Extent { low: Vec3::new(-125.0, -64.0, -6.0), high: Vec3::new(105.0, 64.0, 206.0), step: 3.0 };
+    Extent { low: Vec3::new(-80.0, -64.0, 10.0), high: Vec3::new(60.0, 64.0, 206.0), step: 3.0 };
 
 /// Level of the left ventricle's widest section.
 pub const EQUATOR: f64 = 83.0;
@@ -153,47 +153,5 @@ pub fn parts() -> Vec<Part> {
         part("mitral-opening", "blood", small, opening(p, mitral, ORIFICE[0])),
         part("tricuspid-opening", "blood", small, opening(p, centre, ORIFICE[1])),
         part("papillary-muscles", "myocardium", small, papillary_muscles(p)),
-    ]
-}
-
-/// The resting parts, in rising priority: the chest wall over the apex, two ribs in front of and
-/// behind the plane, the lungs that close the view on both sides.
-pub fn chest() -> Vec<Part> {
-    let p = &Point::world();
-    let side = Point(p.0.clone() + 10.0, p.1.clone(), p.2.clone());
-    let block = ellipsoid(
-        &Point(side.0.clone(), p.1.clone(), Tree::from(0.0)),
-        Vec3::new(105.0, 56.0, 1.0),
-    );
-    let layer = |from: f32, to: f32, phase: f32| {
-        let wave = undulation(p, 0.7, 55.0, phase);
-        let slab = (p.2.clone() + wave - 0.5 * (from + to)).abs() - 0.5 * (to - from);
-        intersection(slab, block.clone(), 2.0)
-    };
-    // Ribs cross the plane's edges at a slant and leave a gap of 19 mm for the probe.
-    let rib = |at: f32| {
-        let axis = Vec3::new(0.97, 0.24, 0.0).normalize();
-        let across = Vec3::new(-axis.y, axis.x, 0.0);
-        let q = p.from(Vec3::new(0.0, at, 13.0));
-        let bow = q.dot(axis).square() * 0.0012;
-        let section = Point(q.dot(across), q.2.clone() - bow, Tree::from(0.0));
-        let band = ellipsoid(&section, Vec3::new(6.5, 3.6, 1.0));
-        intersection(band, block.clone() + 4.0, 2.0)
-    };
-    let pericardium =
-        ellipsoid(&p.from(Vec3::new(-15.5, 0.0, 104.0)), Vec3::new(57.0, 110.0, 106.0));
-    let depth = (p.2.clone() - 104.0).abs() - 86.0;
-    let lungs = difference(
-        intersection(block.clone() + 3.0, depth, 5.0),
-        pericardium + undulation(p, 1.5, 43.0, 0.9),
-        4.0,
-    );
-    let flat = (2.4, 0.05);
-    vec![
-        part("skin", "skin", (1.0, 0.02), layer(1.0, 3.2, 0.3)),
-        part("fat", "fat", flat, layer(3.0, 8.0, 0.3)),
-        part("intercostals", "muscle", flat, layer(7.8, 18.0, 1.9)),
-        part("ribs", "cortical_bone", (3.0, 0.1), rib(-16.0).min(rib(16.0))),
-        part("lungs", "lung", (5.0, 0.1), lungs),
     ]
 }

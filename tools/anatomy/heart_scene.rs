@@ -4,8 +4,9 @@ use std::path::Path;
 
 use crate::beat::{self, KEYFRAMES, PERIOD};
 use crate::check::{self, Surface};
+use crate::chest::Placement;
 use crate::part::Part;
-use crate::{heart, model, output, overlap, valves};
+use crate::{chest, heart, model, output, overlap, valves, windows};
 
 /// Names of the valves' meshes.
 const VALVES: [&str; 2] = ["mitral-valve", "tricuspid-valve"];
@@ -16,51 +17,70 @@ const CHAMBERS: std::ops::RangeInclusive<usize> = 1..=4;
 /// Directions of the axes, as text for the mesh files.
 const AXES: &str = "x from right to left ventricle, y posterior, z from apex to base";
 
-/// Makes `heart.toml` and its meshes in `output`: `budget` triangles, the chest included.
+/// Triangles of the body around the heart.
+const BODY: usize = 12_000;
+
+/// Makes `heart.toml` and its meshes in `output`: `budget` triangles for the heart, [`BODY`] for what is around it.
 pub fn make(budget: usize, output: &Path) -> Result<(), String> {
+    let beating = heart::parts();
+    let moving = keyframes(&beating, budget, output)?;
+    let around = chest::parts();
+    let still = model::surfaces(&around, chest::EXTENT, BODY)?;
+    let placement = Placement::new();
+    for (part, surface) in around.iter().zip(&still) {
+        let path = output.join("heart").join(format!("{}.obj", part.name));
+        output::write(&path, &output::obj(part.name, AXES, &placed(surface, &placement)))?;
+    }
+
+    let command = output::command("heart", budget, "", output);
+    let path = output.join("heart.toml");
+    let lessons = output::kept(&path, "[[task]]");
+    let counts = [moving, model::count(&still)];
+    let text =
+        scene(&beating, &around, &command, counts) + &windows::entries(&placement) + &lessons;
+    output::write(&path, &text)?;
+    println!("{} triangles: {}", counts[0] + counts[1], path.display());
+    Ok(())
+}
+
+/// Writes the beating parts and the valves in every keyframe; returns the triangles of one.
+fn keyframes(parts: &[Part], budget: usize, output: &Path) -> Result<usize, String> {
     // The leaflets' squares become smaller as the triangles of all the rest do.
     let fineness = (budget as f64 / 7300.0).sqrt();
     let around = (22.0 * fineness).round() as usize;
     let along = (4.0 * fineness).round().max(3.0) as usize;
     let leaflets = 2 * around * 2 * (along + 1) * 2;
-
-    let (beating, chest) = (heart::parts(), heart::chest());
-    let count = beating.len();
-    let parts: Vec<Part> = beating.into_iter().chain(chest).collect();
-    let rest = budget.saturating_sub(leaflets);
-    let surfaces = model::surfaces(&parts, heart::EXTENT, rest)?;
-    let (resting, still) = surfaces.split_at(count);
+    let resting = model::surfaces(parts, heart::EXTENT, budget.saturating_sub(leaflets))?;
 
     let mut volumes = Vec::new();
     for (k, phase) in beat::phases().into_iter().enumerate() {
         let mut moved = Vec::new();
-        for surface in resting {
+        for surface in &resting {
             moved.push(beat::at(surface, phase)?);
         }
         for valve in [valves::mitral(), valves::tricuspid()] {
             moved.push(beat::at(&valve.leaflets(phase, around, along), phase)?);
         }
-        let names = parts[..count].iter().map(|p| p.name).chain(VALVES);
+        let names = parts.iter().map(|p| p.name).chain(VALVES);
         for (name, surface) in names.zip(&moved) {
             sound(surface).map_err(|e| format!("{name}, keyframe {k}: {e}"))?;
             let path = output.join("heart").join(format!("{name}-{k}.obj"));
             output::write(&path, &output::obj(name, AXES, surface))?;
         }
-        apart(&moved[..count], &parts).map_err(|e| format!("keyframe {k}: {e}"))?;
+        apart(&moved[..parts.len()], parts).map_err(|e| format!("keyframe {k}: {e}"))?;
         volumes.push(CHAMBERS.map(|i| check::volume(&moved[i]) / 1000.0).collect());
     }
     report(&volumes);
-    for (part, surface) in parts[count..].iter().zip(still) {
-        let path = output.join("heart").join(format!("{}.obj", part.name));
-        output::write(&path, &output::obj(part.name, AXES, surface))?;
-    }
+    Ok(model::count(&resting) + leaflets)
+}
 
-    let total = model::count(&surfaces) + leaflets;
-    let command = output::command("heart", budget, "", output);
-    let path = output.join("heart.toml");
-    output::write(&path, &scene(&parts, count, &command, total))?;
-    println!("{total} triangles: {}", path.display());
-    Ok(())
+/// A surface of the body's frame in the heart's.
+fn placed(surface: &Surface, placement: &Placement) -> Surface {
+    let mut out = surface.clone();
+    for (p, n) in out.positions.iter_mut().zip(&mut out.normals) {
+        (*p, *n) = (placement.point(*p), placement.direction(*n));
+    }
+    out
 }
 
 /// Closed, manifold, outward, and nowhere through itself.
@@ -106,15 +126,14 @@ fn report(volumes: &[Vec<f64>]) {
     }
 }
 
-/// The scene file.
-fn scene(parts: &[Part], count: usize, command: &str, triangles: usize) -> String {
+/// The scene file up to its poses; `counts` are the triangles of the heart and of the body around it.
+fn scene(beating: &[Part], around: &[Part], command: &str, [heart, body]: [usize; 2]) -> String {
     let mut out = format!(
-        "# A beating heart, {triangles} triangles at a time, made by\n#   {command}\n{HEAD}\n\
+        "# A beating heart, {heart} triangles at a time, in a body of {body}, made by\n#   {command}\n{HEAD}\n\
          [[selector]]\nname = \"beat\"\nperiod = \"{PERIOD} s\"\nstrategy = \"interpolate\" # smooth between the eight phases\n\n\
          # In rising priority: where two overlap, the later one wins.\n"
     );
-    let (beating, chest) = parts.split_at(count);
-    for (priority, part) in chest.iter().enumerate() {
+    for (priority, part) in around.iter().enumerate() {
         let file = format!("file = \"heart/{}.obj\"\n", part.name);
         out += &output::mesh_entry(part.name, part.tissue, priority, &file);
     }
@@ -122,10 +141,9 @@ fn scene(parts: &[Part], count: usize, command: &str, triangles: usize) -> Strin
     for (i, (name, tissue)) in beating.chain(VALVES.map(|v| (v, "valve"))).enumerate() {
         let files = output::keyframes("heart", name, KEYFRAMES);
         let rest = format!("parent = \"beat\"\n{files}{}", surface(name));
-        out += &output::mesh_entry(name, tissue, 10 + i, &rest);
+        out += &output::mesh_entry(name, tissue, around.len() + i, &rest);
     }
-    out.truncate(out.trim_end().len());
-    out + "\n"
+    out
 }
 
 /// Differences of a surface from its tissue's, as lines of its entry.
@@ -143,11 +161,13 @@ fn surface(name: &str) -> &'static str {
 }
 
 /// The lines before the meshes.
-const HEAD: &str = r#"# World frame, mm: x from the right to the left ventricle, y to the back, z from the chest wall at
-# the apex to the heart's base. Apical four-chamber view: left ventricle on the right.
+const HEAD: &str = r#"# World frame, mm: that of the heart. x from the right to the left ventricle, y to the back, z from the chest wall at
+# the apex to the heart's base. Apical four-chamber view: left ventricle on the right. In it the
+# body's left is [0.76, 0.21, -0.61], its back [0.32, 0.71, 0.64], its head [0.57, -0.68, 0.47]. Outside the skin is
+# coupling gel.
 # Volumes after Lang et al., J Am Soc Echocardiogr 2015;28:1-39.
 name = "Beating heart, apical four-chamber view"
-background = "chest"
+background = "gel"
 
 [probe]
 preset = "cardiac"
@@ -160,7 +180,7 @@ lateral = [0.987, 0, 0.16]
 
 # Gel, and skin that would yield to the pressed face.
 [contact]
-mesh = ["skin", "fat", "intercostals"]
+mesh = ["skin", "body"]
 gel = "5 mm"
 
 # Blood attenuates less than the tissue that the curve assumes: the far sliders go down.
@@ -178,6 +198,15 @@ echogenicity = "+2 dB"
 texture_depth = 0.35
 texture_length = "6 mm"
 source = "chosen by this project, no source found"
+
+# Costal cartilage of an adult, in part calcified: it weakens the beam, but does not stop it.
+[tissues.cartilage]
+based_on = "muscle"
+speed = "1665 m/s"
+density = "1100 kg/m3"
+attenuation = "2.5 dB/cm/MHz"
+echogenicity = "-6 dB"
+source = "speed: articular cartilage, Toyras et al., Phys Med Biol 2003;48:2875; the rest chosen by this project, no source found"
 
 # Leaflets are dense collagen, acoustically near skin.
 [tissues.valve]

@@ -30,7 +30,8 @@ fn vector(v: Vec3, digits: usize) -> String {
     format!("[{:.digits$}, {:.digits$}, {:.digits$}]", v.x, v.y, v.z)
 }
 
-fn pose_lines(pose: &Pose, comment: &str) -> String {
+/// The lines of a pose, each after `comment`.
+pub fn pose_lines(pose: &Pose, comment: &str) -> String {
     format!(
         "{comment}position = {}\n{comment}direction = {}\n{comment}lateral = {}\n",
         vector(pose.position, 2),
@@ -127,6 +128,13 @@ pub fn keyframes(folder: &str, name: &str, count: usize) -> String {
     let file = |k| format!("    \"{folder}/{name}-{k}.obj\",\n");
     let files: String = (0..count).map(file).collect();
     format!("keyframes = [\n{files}]\n")
+}
+
+/// What a person has added at the end of the scene file at `path`: from the first `entry` on. Empty where there is no
+/// such file.
+pub fn kept(path: &Path, entry: &str) -> String {
+    let text = std::fs::read_to_string(path).unwrap_or_default();
+    text.find(entry).map_or(String::new(), |at| text[at..].to_owned())
 }
 
 /// Writes `text` to `path`, making its folder.
