@@ -1,6 +1,6 @@
 //! The examination: saved pictures without what is pressed, worksheet and report.
 
-use super::desk::{Desk, Key};
+use super::desk::{Desk, Display, Key};
 use super::tools::sidecar;
 use super::{SCENE, brightness, difference};
 
@@ -104,5 +104,60 @@ fn marks_leave_the_image_with_the_freeze_and_stay_on_the_worksheet() {
     desk.press(Key::F2);
     let removed = sidecar(&mut desk, &captures, "cyst-and-wires-0003.json");
     assert_eq!(removed["worksheet"].as_array().map(Vec::len), Some(0));
+    desk.quit();
+}
+
+/// Stands in for `ffmpeg`: the film is the number of bytes that it was given.
+const ENCODER: &str = "#!/bin/sh\nfor last; do :; done\nwc -c | tr -d ' ' > \"${last#file:}\"\n";
+
+#[test]
+fn a_loop_becomes_a_film_where_there_is_an_encoder() {
+    use std::os::unix::fs::PermissionsExt as _;
+    let folder = tempfile::tempdir().expect("a folder");
+    let captures = folder.path().join("captures");
+    let arguments = ["--captures", captures.to_str().expect("UTF-8"), "--validate"];
+    let Some(display) = Display::open() else {
+        return;
+    };
+    let encoder = folder.path().join("ffmpeg");
+    std::fs::write(&encoder, ENCODER).expect("written");
+    std::fs::set_permissions(&encoder, std::fs::Permissions::from_mode(0o755)).expect("mine");
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let paths = [folder.path().to_owned()].into_iter().chain(std::env::split_paths(&path));
+    let path = std::env::join_paths(paths).expect("plain names");
+    let with_encoder = |_: &std::path::Path, command: &mut std::process::Command| {
+        command.env("PATH", path);
+    };
+    let Some(mut desk) = Desk::open_on(display, SCENE, &arguments, with_encoder) else {
+        return;
+    };
+    desk.wait_for("an image", |d| brightness(&d.grab(super::IMAGE)) > 10.0);
+    desk.settle(super::IMAGE);
+    desk.press(Key::Space);
+    desk.settle(super::IMAGE);
+    // The list at the bar's right end: GIF, MP4, PNGs.
+    desk.click((907, 702));
+    desk.click((900, 658));
+    desk.press(Key::F3);
+    let clip = sidecar(&mut desk, &captures, "cyst-and-wires-0001.json");
+    assert_eq!(clip["file"], "cyst-and-wires-0001.mp4");
+    let count = std::fs::read_to_string(captures.join("cyst-and-wires-0001.mp4")).expect("a film");
+    let side = |key: &str| clip["image"][key].as_u64().expect("a size").next_multiple_of(2);
+    let frame = 3 * side("width") * side("height");
+    let bytes: u64 = count.trim().parse().expect("a number");
+    assert!(bytes > 0 && bytes % frame == 0, "{bytes} bytes in frames of {frame}");
+    // An encoder that fails leaves nothing, and the next format goes on.
+    std::fs::write(&encoder, "#!/bin/sh\necho half > \"$0.half\"\necho broken >&2\nexit 1\n")
+        .expect("written");
+    let before = desk.grab(super::IMAGE);
+    desk.press(Key::F3);
+    desk.wait_for("the reason", |d| difference(&d.grab(super::IMAGE), &before) > 0.2);
+    let mut left: Vec<_> = std::fs::read_dir(&captures)
+        .expect("a folder")
+        .map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned())
+        .collect();
+    left.sort();
+    assert_eq!(left, ["cyst-and-wires-0001.json", "cyst-and-wires-0001.mp4"]);
+    image::RgbImage::from_raw(1280, 720, desk.grab([0, 0, 1280, 720])).unwrap().unwrap();
     desk.quit();
 }
