@@ -145,7 +145,7 @@ fn a_loop_becomes_a_film_where_there_is_an_encoder() {
     let side = |key: &str| clip["image"][key].as_u64().expect("a size").next_multiple_of(2);
     let frame = 3 * side("width") * side("height");
     let bytes: u64 = count.trim().parse().expect("a number");
-    assert!(bytes > 0 && bytes % frame == 0, "{bytes} bytes in frames of {frame}");
+    assert!(bytes > 0 && bytes.is_multiple_of(frame), "{bytes} bytes in frames of {frame}");
     // An encoder that fails leaves nothing, and the next format goes on.
     std::fs::write(&encoder, "#!/bin/sh\necho half > \"$0.half\"\necho broken >&2\nexit 1\n")
         .expect("written");
@@ -158,6 +158,80 @@ fn a_loop_becomes_a_film_where_there_is_an_encoder() {
         .collect();
     left.sort();
     assert_eq!(left, ["cyst-and-wires-0001.json", "cyst-and-wires-0001.mp4"]);
-    image::RgbImage::from_raw(1280, 720, desk.grab([0, 0, 1280, 720])).unwrap().unwrap();
+    desk.quit();
+}
+
+/// Pixels in the colour of the electrocardiogram.
+fn green(pixels: &[u8]) -> usize {
+    pixels.chunks_exact(3).filter(|p| p[1] > 150 && p[0] < 130 && p[2] < 160).count()
+}
+
+#[test]
+fn texts_of_the_examination_are_chosen_from_a_list() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let captures = folder.path().join("captures");
+    let arguments = ["--captures", captures.to_str().expect("UTF-8"), "--validate"];
+    let scene = SCENE.replace("[imaging]", "[imaging]\nexam = \"cardiac\"");
+    let Some(mut desk) = Desk::open(&scene, &arguments) else {
+        return;
+    };
+    desk.press(Key::Letter('c'));
+    desk.press(Key::Letter('v'));
+    desk.wait_for("an image", |d| brightness(&d.grab([500, 200, 300, 300])) > 10.0);
+    desk.press(Key::Space);
+    desk.press(Key::Letter('n'));
+    desk.click((560, 250));
+    desk.still(ALL);
+    // The first text of the list below the field.
+    desk.click((575, 278));
+    desk.still(ALL);
+    desk.press(Key::F2);
+    let said = sidecar(&mut desk, &captures, "cyst-and-wires-0001.json");
+    assert_eq!(said["texts"][0]["text"], "PLAX");
+    assert_eq!(green(&desk.grab(ALL)), 0, "nothing beats in this scene");
+    desk.quit();
+}
+
+/// A cube whose side is 10 mm times `size`.
+fn cube(size: f64) -> String {
+    let corners = [(0, 0), (1, 0), (1, 1), (0, 1)];
+    let corner = |z: u32| {
+        corners.map(|(x, y)| [x, y, z].map(|side| (10.0 * size * f64::from(side)).to_string()))
+    };
+    let vertices = [corner(0), corner(1)].concat();
+    let vertices: String = vertices.iter().map(|v| format!("v {}\n", v.join(" "))).collect();
+    vertices + "f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n"
+}
+
+#[test]
+fn a_beating_scene_has_its_electrocardiogram() {
+    let Some(display) = Display::open() else {
+        return;
+    };
+    let beating = "[[selector]]\nname = \"beat\"\nperiod = \"0.8 s\"\n[[mesh]]\nname = \"heart\"\n\
+        parent = \"beat\"\ntissue = \"blood\"\nkeyframes = [\"large.obj\", \"small.obj\"]\n\
+        translate = [-5, -5, 10]\n";
+    let scene = SCENE.replace("[imaging]", "[imaging]\nexam = \"cardiac\"") + beating;
+    let prepare = |folder: &std::path::Path, _: &mut std::process::Command| {
+        std::fs::write(folder.join("large.obj"), cube(1.0)).expect("written");
+        std::fs::write(folder.join("small.obj"), cube(0.8)).expect("written");
+    };
+    let Some(mut desk) = Desk::open_on(display, &scene, &["--validate"], prepare) else {
+        return;
+    };
+    desk.press(Key::Letter('c'));
+    desk.press(Key::Letter('v'));
+    let edge = [0, 600, 1280, 84];
+    desk.wait_for("the trace", |d| green(&d.grab(edge)) > 200);
+    // Frozen it stands, and its mark goes back with the images.
+    desk.wait_for("some images", |d| brightness(&d.grab([500, 200, 300, 300])) > 10.0);
+    std::thread::sleep(std::time::Duration::from_millis(500));
+    desk.press(Key::Space);
+    desk.still(edge);
+    let newest = desk.grab(edge);
+    desk.press(Key::Letter(','));
+    desk.wait_for("the mark to go back", |d| d.grab(edge) != newest);
+    desk.still(edge);
+    assert!(green(&desk.grab(edge)) > 200);
     desk.quit();
 }
