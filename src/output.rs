@@ -5,6 +5,7 @@ pub mod dicom;
 pub mod files;
 pub mod indexed;
 pub mod movie;
+pub mod mp4;
 pub mod npy;
 pub mod npz;
 pub mod picture;

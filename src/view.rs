@@ -11,6 +11,7 @@ mod captures;
 mod cine;
 mod console;
 mod deaths;
+mod ecg;
 pub mod engine;
 mod exam;
 mod files;

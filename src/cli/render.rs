@@ -38,8 +38,8 @@ pub struct Render {
     /// Image to write (PNG, 8-bit grey, with the size of a pixel) [default: the scene's name with .png, here]; its
     /// folder is made. NAME.json beside it says settings, pose, time and place of its pixels. With several
     /// frames NAME.png becomes NAME.0000.png, NAME.0001.png, ...; `{}` or `%04d` in the name says
-    /// where the number goes. NAME.gif is an animation of all frames, played again and again. NAME.dcm is a loop in
-    /// DICOM, with the size of a pixel. NAME.seq.mha and NAME.seq.nrrd are loops with the probe's pose at each frame,
+    /// where the number goes. NAME.gif is an animation of all frames, played again and again; NAME.mp4 a film in
+    /// H.264, which the program ffmpeg makes. NAME.dcm is a loop in DICOM, with the size of a pixel. NAME.seq.mha and NAME.seq.nrrd are loops with the probe's pose at each frame,
     /// for 3D Slicer and PLUS. NAME.uff has IQ and RF of all frames for USTB. NAME.hdf5 is a file of zea: images, poses,
     /// envelope, IQ and RF; with --set simulation.labels=true also the segmentation and every label of the pixels.
     #[arg(short, long)]

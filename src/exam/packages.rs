@@ -188,10 +188,83 @@ pub fn names(exam: Exam, kind: Kind) -> impl Iterator<Item = &'static Item> {
     items(exam).filter(move |item| item.quantity.is_of(kind))
 }
 
+/// Texts that are usual on the images of an examination, the commonest first.
+pub fn annotations(exam: Exam) -> &'static [&'static str] {
+    match exam {
+        Exam::General => &["right", "left", "trans", "sag", "cyst", "lesion"],
+        Exam::Abdomen => &[
+            "liver",
+            "gallbladder",
+            "CBD",
+            "portal vein",
+            "IVC",
+            "aorta",
+            "pancreas",
+            "spleen",
+            "right kidney",
+            "left kidney",
+            "bladder",
+            "trans",
+            "sag",
+        ],
+        Exam::Cardiac => &[
+            "PLAX",
+            "PSAX",
+            "4CH",
+            "2CH",
+            "3CH",
+            "5CH",
+            "subcostal",
+            "LV",
+            "RV",
+            "LA",
+            "RA",
+            "RVOT",
+            "LVOT",
+            "MV",
+            "AV",
+            "TV",
+            "PV",
+        ],
+        Exam::Obstetric => &[
+            "head", "abdomen", "femur", "face", "spine", "4CH", "RVOT", "LVOT", "stomach",
+            "bladder", "cord", "placenta", "cervix", "amnion", "yolk sac", "trans", "sag",
+        ],
+        Exam::Vascular => {
+            &["CCA", "ICA", "ECA", "bulb", "IJV", "plaque", "right", "left", "trans", "long"]
+        }
+        Exam::SmallParts => &[
+            "right lobe",
+            "left lobe",
+            "isthmus",
+            "trachea",
+            "nodule",
+            "muscle",
+            "tendon",
+            "bone",
+            "nerve",
+            "trans",
+            "long",
+        ],
+        Exam::Lung => &["pleura", "A lines", "B lines", "rib", "diaphragm", "effusion"],
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::settings::Words as _;
+
+    #[test]
+    fn every_examination_has_texts_that_fit_beside_an_image() {
+        for &exam in Exam::ALL {
+            let all = annotations(exam);
+            let once: std::collections::BTreeSet<_> = all.iter().collect();
+            assert!(all.len() >= 6 && once.len() == all.len(), "{exam}");
+            assert!(all.iter().all(|text| (1..=14).contains(&text.len())), "{exam}");
+        }
+        assert!(annotations(Exam::Cardiac).contains(&"4CH"));
+    }
 
     #[test]
     fn names_suit_the_examination_and_are_there_once() {

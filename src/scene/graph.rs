@@ -3,7 +3,7 @@
 
 use glam::{DAffine3, DMat3, DVec3};
 
-use super::animation::{Motion, Sequence};
+use super::animation::{Clock, Loop, Motion, Sequence};
 use super::{Acquired, Instance, Scene, Strategy};
 
 /// Nodes, each after its parent.
@@ -297,6 +297,17 @@ impl Scene {
         };
         let changes = |acquired: &Acquired| acquired.sequence.is_some();
         self.graph.nodes.iter().any(moves) || self.volume.as_ref().is_some_and(changes)
+    }
+
+    /// Clock of what beats: of the first selector whose keyframes follow each other again and again, from the first one.
+    /// Whether that is a heart, the examination says.
+    pub fn beat(&self) -> Option<Clock> {
+        self.graph.nodes.iter().find_map(|node| match &node.kind {
+            NodeKind::Selector(sequence) => {
+                Some(*sequence.clock()).filter(|clock| clock.mode == Loop::Repeat)
+            }
+            _ => None,
+        })
     }
 
     /// Places the whole model, meshes and wires, in the world: probe and acquired volume stay. Nodes of the graph

@@ -29,13 +29,13 @@ const COLOURS: [Color32; 5] = [
 ];
 
 /// Handles the pointer's events over the picture, and draws all marks.
-/// `listens`: keys may take tools; `bare`: only what belongs to a saved picture is drawn.
+/// `exam` has the texts that are offered; `listens`: keys may take tools; `bare`: only what belongs to a saved picture is drawn.
 pub(super) fn show(
     ui: &mut Ui,
     sheet: &mut Sheet,
     place: &Place,
     frame: &Frame,
-    (listens, bare): (bool, bool),
+    (exam, listens, bare): (Exam, bool, bool),
 ) {
     let room = ui.max_rect().intersect(place.seen().expand(12.0));
     pointer(ui, sheet, place, frame, (room, listens));
@@ -64,7 +64,7 @@ pub(super) fn show(
     if !bare {
         draft(&painter, sheet, place);
     }
-    notes::editor(ui, sheet, place);
+    notes::editor(ui, sheet, place, exam);
 }
 
 /// Where a right click on the image asks what lies there.

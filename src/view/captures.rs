@@ -1,5 +1,6 @@
 //! Stills and clips: read back from the device and written on threads of their own.
 
+mod clip;
 mod files;
 
 use std::path::{Path, PathBuf};
@@ -10,13 +11,15 @@ use std::thread::JoinHandle;
 
 use serde_json::{Map, Value};
 
-use self::files::{Claim, scaled};
+use self::files::Claim;
 use super::deaths::CAPTURE;
 use super::engine::Frame;
 use crate::exam::{Picture, Report};
 use crate::gpu::{GpuError, Screenshot};
-use crate::output::movie::{Movie, MovieError};
+use crate::output::movie::MovieError;
+use crate::output::mp4::Mp4Error;
 use crate::output::picture::grey_png;
+pub(super) use clip::{Clip, Format};
 
 /// The settings written beside a picture: see `docs/window.md`.
 pub(super) type Sidecar = Map<String, Value>;
@@ -43,6 +46,9 @@ pub(super) enum CaptureError {
         /// The system's message.
         cause: String,
     },
+    /// A film cannot be made.
+    #[error("{0}; the loop stays")]
+    Mp4(#[from] Mp4Error),
     /// The image cannot be read back.
     #[error("the image cannot be read back: {0}")]
     Gpu(#[from] GpuError),
@@ -98,27 +104,6 @@ pub(super) struct Still {
     pub(super) strip: Option<SavedStrip>,
 }
 
-/// File format of a clip.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Format {
-    /// One animated GIF.
-    Gif,
-    /// A folder of PNG files.
-    Sequence,
-}
-
-/// Images one after the other, to be saved.
-pub(super) struct Clip {
-    /// Images, each with the time until which it is shown, s from the beginning.
-    pub(super) frames: Vec<(Frame, f64)>,
-    /// The text written beside them.
-    pub(super) sidecar: Sidecar,
-    /// File format.
-    pub(super) format: Format,
-    /// The M-mode strip, while it is drawn.
-    pub(super) strip: Option<SavedStrip>,
-}
-
 /// Progress of a capture.
 pub(super) struct Progress {
     done: AtomicU32,
@@ -135,6 +120,11 @@ impl Progress {
     /// Cancels the capture: nothing of it is kept.
     pub(super) fn cancel(&self) {
         self.cancelled.store(true, Ordering::Relaxed);
+    }
+
+    /// Notes that an image is written.
+    fn step(&self) {
+        self.done.fetch_add(1, Ordering::Relaxed);
     }
 
     fn is_cancelled(&self) -> bool {
@@ -189,47 +179,10 @@ impl Captures {
         });
     }
 
-    /// Saves images as `STEM-NNNN.gif`, or as `STEM-NNNN/0000.png` and so on.
+    /// Saves images as `STEM-NNNN.gif`, as `STEM-NNNN.mp4`, or as `STEM-NNNN/0000.png` and so on.
     pub(super) fn clip(&mut self, folder: PathBuf, stem: String, clip: Clip) {
         let total = clip.frames.len() as u32;
-        self.begin(total, move |progress| {
-            let mut claim = Claim::new(&folder, &stem)?;
-            let target = match clip.format {
-                Format::Gif => claim.add(".gif"),
-                Format::Sequence => claim.add_folder()?,
-            };
-            let mut movie = match clip.format {
-                Format::Gif => Some(Movie::new(&target)?),
-                Format::Sequence => None,
-            };
-            let extents = clip.frames.iter().map(|(frame, _)| frame.image.extent());
-            let [width, height, _] = extents.max().unwrap_or_default();
-            for (index, (frame, end)) in clip.frames.into_iter().enumerate() {
-                if progress.is_cancelled() {
-                    return Ok(None);
-                }
-                let rgba = frame.image.read_back()?;
-                let [across, down, _] = frame.image.extent();
-                let rgba = scaled(rgba, [across, down], [width, height]);
-                let pitch = frame.sector.pitch * f64::from(down) / f64::from(height);
-                match &mut movie {
-                    Some(movie) => movie.add(width, height, &rgba, end)?,
-                    None => {
-                        let file = target.join(format!("{index:04}.png"));
-                        let picture = grey_png([width, height], &rgba, pitch, None);
-                        files::write_new(&file, &picture)?;
-                    }
-                }
-                progress.done.fetch_add(1, Ordering::Relaxed);
-            }
-            let mut sidecar = clip.sidecar;
-            sidecar.insert("file".into(), files::name(&target));
-            if let Some(strip) = clip.strip {
-                strip.write(&mut claim, &mut sidecar)?;
-            }
-            claim.keep(&sidecar)?;
-            Ok(Some(target))
-        });
+        self.begin(total, move |progress| clip.write(&folder, &stem, progress));
     }
 
     /// Saves a report with pictures from files as `STEM-NNNN.html` in a folder, which is made where it does not exist.

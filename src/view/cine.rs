@@ -89,10 +89,13 @@ fn speed(ui: &mut Ui, cine: &mut Cine<Frame>, now: Instant) {
 fn choose(ui: &mut Ui, format: &mut Format) {
     let name = |format| match format {
         Format::Gif => "GIF".to_owned(),
+        Format::Mp4 => "MP4".to_owned(),
         Format::Sequence => "PNGs".to_owned(),
     };
-    style::choice(ui, ("format", 56.0), format, &[Format::Gif, Format::Sequence], name)
-        .on_hover_text("How a clip is saved (F3): an animated GIF, or a folder of PNG files");
+    let tip = "How a clip is saved (F3): an animated GIF, an MP4 film (the program ffmpeg makes it), or a folder of \
+               PNG files";
+    let all = [Format::Gif, Format::Mp4, Format::Sequence];
+    style::choice(ui, ("format", 56.0), format, &all, name).on_hover_text(tip);
 }
 
 /// The track: one place per image; a drag looks through them.

@@ -14,9 +14,10 @@ use super::model::mmode::Strip;
 use super::state::State;
 use super::statistics::Times;
 use super::{
-    beside, calipers, cine, deaths, exam, files, gallery, keys, leaving, lesson, mmode, naming,
+    beside, calipers, cine, deaths, ecg, exam, files, gallery, keys, leaving, lesson, mmode, naming,
     notice, offer, planes, saved, strip, style, timing, view3d,
 };
+use crate::settings::Exam;
 
 /// Width of the toggles and the loop beside each other, points.
 const BAR: f32 = 940.0;
@@ -136,7 +137,9 @@ pub(super) fn show(
         let (sheet, listens) = (&mut model.sheet, !state.has_dialog());
         let kind = model.settings.imaging.exam;
         if let (Some(place), Some(frame)) = (&place, frame) {
-            calipers::show(ui, sheet, place, frame, (listens, bare));
+            calipers::show(ui, sheet, place, frame, (kind, listens, bare));
+            let newest = state.tools.cine.newest().map(|newest| newest.seconds);
+            ecg::show(ui, place, (frame, newest), model.beat.filter(|_| kind == Exam::Cardiac));
             state.framing.follow(ui, place);
             if let Some(at) = calipers::asked(ui, place) {
                 let mm = place.mm(at);

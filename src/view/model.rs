@@ -75,6 +75,8 @@ pub struct Model {
     pub frozen: bool,
     /// True where anything in the scene follows time.
     pub animated: bool,
+    /// Clock of the heart, where the scene has one.
+    pub beat: Option<crate::scene::animation::Clock>,
     /// The M-mode strip of one scanline, while it is drawn.
     pub mmode: Option<Strip>,
     /// The placed meshes, as [`Settings::surfaces`].
@@ -190,6 +192,7 @@ impl Model {
             clock: Clock::new(seconds, animated, now),
             frozen: false,
             animated,
+            beat: scene.beat(),
             mmode: None,
             meshes: (scene.instances.iter().enumerate())
                 .map(|(index, i)| Placed {

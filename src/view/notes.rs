@@ -1,10 +1,12 @@
 //! Texts on the image: the drawing, and the field in which one is typed.
 
-use egui::{Area, Color32, Context, Id, Order, Painter, Pos2, Stroke, TextEdit, Ui, vec2};
+use egui::{Area, Color32, Context, Frame, Id, Order, Painter, Pos2, Stroke, TextEdit, Ui, vec2};
 
 use super::bmode::Place;
 use super::calipers::{label, to_screen};
 use super::model::sheet::{Note, Sheet, What};
+use crate::exam::annotations;
+use crate::settings::Exam;
 
 /// Draws an arrow from a text to the point it names.
 pub(super) fn arrow(painter: &Painter, from: Pos2, tip: Pos2, colour: Color32) {
@@ -26,31 +28,63 @@ pub(super) fn write(painter: &Painter, place: &Place, note: &Note, colour: Color
     label(painter, at, &note.text, colour);
 }
 
-/// The field of the note that is being written.
-pub(super) fn editor(ui: &Ui, sheet: &mut Sheet, place: &Place) {
+/// The field of the note that is being written, with the texts usual in the examination.
+pub(super) fn editor(ui: &Ui, sheet: &mut Sheet, place: &Place, exam: Exam) {
     let Some(index) = sheet.editing() else { return };
     if let What::Note(note) = &sheet.marks()[index].what {
         let (text, at) = (note.text.clone(), to_screen(place, note.at));
-        field(ui.ctx(), sheet, index, text, at);
+        field(ui.ctx(), sheet, index, (text, exam), at);
     }
 }
 
-/// The field in which a note is typed; Enter or a click elsewhere keeps it.
-fn field(context: &Context, sheet: &mut Sheet, index: usize, mut text: String, at: Pos2) {
-    Area::new(Id::new(("note", index)))
-        .order(Order::Foreground)
-        .fixed_pos(at - vec2(4.0, 11.0))
-        .show(context, |ui| {
-            let field =
-                TextEdit::singleline(&mut text).desired_width(150.0).hint_text("text, Enter");
-            let response = ui.add(field);
-            // The last letters may have come together with Enter.
-            sheet.set_text(index, text);
-            match response.lost_focus() {
-                true => sheet.stop_editing(),
-                false => response.request_focus(),
+/// The field in which a note is typed or chosen; Enter or a click elsewhere keeps it.
+fn field(
+    context: &Context,
+    sheet: &mut Sheet,
+    index: usize,
+    (mut text, exam): (String, Exam),
+    at: Pos2,
+) {
+    let id = Id::new(("note", index));
+    // The list takes the focus from the field before the click on it has ended.
+    let listed = context.memory(|memory| memory.area_rect(id));
+    let area = Area::new(id).order(Order::Foreground).fixed_pos(at - vec2(4.0, 11.0));
+    area.constrain(true).show(context, |ui| {
+        let field = TextEdit::singleline(&mut text).desired_width(150.0).hint_text("text, Enter");
+        let response = ui.add(field);
+        // The last letters may have come together with Enter.
+        sheet.set_text(index, text);
+        let chosen = choose(ui, annotations(exam));
+        let pressed = ui.input(|input| {
+            let at = input.pointer.interact_pos().filter(|_| input.pointer.any_pressed());
+            at.is_some_and(|at| listed.is_some_and(|area| area.contains(at)))
+        });
+        if let Some(chosen) = chosen {
+            sheet.set_text(index, chosen.to_owned());
+            sheet.stop_editing();
+        } else if response.lost_focus() && !pressed {
+            sheet.stop_editing();
+        } else if !ui.input(|input| input.pointer.any_down()) {
+            response.request_focus();
+        }
+    });
+}
+
+/// Draws texts side by side, as many as there are; returns the one that is clicked.
+fn choose(ui: &mut Ui, texts: &[&'static str]) -> Option<&'static str> {
+    let mut chosen = None;
+    Frame::popup(ui.style()).inner_margin(3).show(ui, |ui| {
+        ui.set_max_width(220.0);
+        ui.spacing_mut().item_spacing = vec2(3.0, 3.0);
+        ui.horizontal_wrapped(|ui| {
+            for text in texts {
+                if ui.small_button(*text).clicked() {
+                    chosen = Some(*text);
+                }
             }
         });
+    });
+    chosen
 }
 
 #[cfg(test)]
@@ -81,7 +115,7 @@ mod tests {
                     panic!("a note is edited");
                 };
                 let text = note.text.clone();
-                field(ui.ctx(), &mut sheet, index, text, pos2(50.0, 50.0));
+                field(ui.ctx(), &mut sheet, index, (text, Exam::Cardiac), pos2(50.0, 50.0));
             });
             output.textures_delta.clear();
         };

@@ -1,6 +1,6 @@
 //! The examination: saved pictures without what is pressed, worksheet and report.
 
-use super::desk::{Desk, Key};
+use super::desk::{Desk, Display, Key};
 use super::tools::sidecar;
 use super::{SCENE, brightness, difference};
 
@@ -104,5 +104,134 @@ fn marks_leave_the_image_with_the_freeze_and_stay_on_the_worksheet() {
     desk.press(Key::F2);
     let removed = sidecar(&mut desk, &captures, "cyst-and-wires-0003.json");
     assert_eq!(removed["worksheet"].as_array().map(Vec::len), Some(0));
+    desk.quit();
+}
+
+/// Stands in for `ffmpeg`: the film is the number of bytes that it was given.
+const ENCODER: &str = "#!/bin/sh\nfor last; do :; done\nwc -c | tr -d ' ' > \"${last#file:}\"\n";
+
+#[test]
+fn a_loop_becomes_a_film_where_there_is_an_encoder() {
+    use std::os::unix::fs::PermissionsExt as _;
+    let folder = tempfile::tempdir().expect("a folder");
+    let captures = folder.path().join("captures");
+    let arguments = ["--captures", captures.to_str().expect("UTF-8"), "--validate"];
+    let Some(display) = Display::open() else {
+        return;
+    };
+    let encoder = folder.path().join("ffmpeg");
+    std::fs::write(&encoder, ENCODER).expect("written");
+    std::fs::set_permissions(&encoder, std::fs::Permissions::from_mode(0o755)).expect("mine");
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let paths = [folder.path().to_owned()].into_iter().chain(std::env::split_paths(&path));
+    let path = std::env::join_paths(paths).expect("plain names");
+    let with_encoder = |_: &std::path::Path, command: &mut std::process::Command| {
+        command.env("PATH", path);
+    };
+    let Some(mut desk) = Desk::open_on(display, SCENE, &arguments, with_encoder) else {
+        return;
+    };
+    desk.wait_for("an image", |d| brightness(&d.grab(super::IMAGE)) > 10.0);
+    desk.settle(super::IMAGE);
+    desk.press(Key::Space);
+    desk.settle(super::IMAGE);
+    // The list at the bar's right end: GIF, MP4, PNGs.
+    desk.click((907, 702));
+    desk.click((900, 658));
+    desk.press(Key::F3);
+    let clip = sidecar(&mut desk, &captures, "cyst-and-wires-0001.json");
+    assert_eq!(clip["file"], "cyst-and-wires-0001.mp4");
+    let count = std::fs::read_to_string(captures.join("cyst-and-wires-0001.mp4")).expect("a film");
+    let side = |key: &str| clip["image"][key].as_u64().expect("a size").next_multiple_of(2);
+    let frame = 3 * side("width") * side("height");
+    let bytes: u64 = count.trim().parse().expect("a number");
+    assert!(bytes > 0 && bytes.is_multiple_of(frame), "{bytes} bytes in frames of {frame}");
+    // An encoder that fails leaves nothing, and the next format goes on.
+    std::fs::write(&encoder, "#!/bin/sh\necho half > \"$0.half\"\necho broken >&2\nexit 1\n")
+        .expect("written");
+    let before = desk.grab(super::IMAGE);
+    desk.press(Key::F3);
+    desk.wait_for("the reason", |d| difference(&d.grab(super::IMAGE), &before) > 0.2);
+    let mut left: Vec<_> = std::fs::read_dir(&captures)
+        .expect("a folder")
+        .map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned())
+        .collect();
+    left.sort();
+    assert_eq!(left, ["cyst-and-wires-0001.json", "cyst-and-wires-0001.mp4"]);
+    desk.quit();
+}
+
+/// Pixels in the colour of the electrocardiogram.
+fn green(pixels: &[u8]) -> usize {
+    pixels.chunks_exact(3).filter(|p| p[1] > 150 && p[0] < 130 && p[2] < 160).count()
+}
+
+#[test]
+fn texts_of_the_examination_are_chosen_from_a_list() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let captures = folder.path().join("captures");
+    let arguments = ["--captures", captures.to_str().expect("UTF-8"), "--validate"];
+    let scene = SCENE.replace("[imaging]", "[imaging]\nexam = \"cardiac\"");
+    let Some(mut desk) = Desk::open(&scene, &arguments) else {
+        return;
+    };
+    desk.press(Key::Letter('c'));
+    desk.press(Key::Letter('v'));
+    desk.wait_for("an image", |d| brightness(&d.grab([500, 200, 300, 300])) > 10.0);
+    desk.press(Key::Space);
+    desk.press(Key::Letter('n'));
+    desk.click((560, 250));
+    desk.still(ALL);
+    // The first text of the list below the field.
+    desk.click((575, 278));
+    desk.still(ALL);
+    desk.press(Key::F2);
+    let said = sidecar(&mut desk, &captures, "cyst-and-wires-0001.json");
+    assert_eq!(said["texts"][0]["text"], "PLAX");
+    assert_eq!(green(&desk.grab(ALL)), 0, "nothing beats in this scene");
+    desk.quit();
+}
+
+/// A cube whose side is 10 mm times `size`.
+fn cube(size: f64) -> String {
+    let corners = [(0, 0), (1, 0), (1, 1), (0, 1)];
+    let corner = |z: u32| {
+        corners.map(|(x, y)| [x, y, z].map(|side| (10.0 * size * f64::from(side)).to_string()))
+    };
+    let vertices = [corner(0), corner(1)].concat();
+    let vertices: String = vertices.iter().map(|v| format!("v {}\n", v.join(" "))).collect();
+    vertices + "f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n"
+}
+
+#[test]
+fn a_beating_scene_has_its_electrocardiogram() {
+    let Some(display) = Display::open() else {
+        return;
+    };
+    let beating = "[[selector]]\nname = \"beat\"\nperiod = \"0.8 s\"\n[[mesh]]\nname = \"heart\"\n\
+        parent = \"beat\"\ntissue = \"blood\"\nkeyframes = [\"large.obj\", \"small.obj\"]\n\
+        translate = [-5, -5, 10]\n";
+    let scene = SCENE.replace("[imaging]", "[imaging]\nexam = \"cardiac\"") + beating;
+    let prepare = |folder: &std::path::Path, _: &mut std::process::Command| {
+        std::fs::write(folder.join("large.obj"), cube(1.0)).expect("written");
+        std::fs::write(folder.join("small.obj"), cube(0.8)).expect("written");
+    };
+    let Some(mut desk) = Desk::open_on(display, &scene, &["--validate"], prepare) else {
+        return;
+    };
+    desk.press(Key::Letter('c'));
+    desk.press(Key::Letter('v'));
+    let edge = [0, 600, 1280, 84];
+    desk.wait_for("the trace", |d| green(&d.grab(edge)) > 200);
+    // Frozen it stands, and its mark goes back with the images.
+    desk.wait_for("some images", |d| brightness(&d.grab([500, 200, 300, 300])) > 10.0);
+    std::thread::sleep(std::time::Duration::from_millis(500));
+    desk.press(Key::Space);
+    desk.still(edge);
+    let newest = desk.grab(edge);
+    desk.press(Key::Letter(','));
+    desk.wait_for("the mark to go back", |d| d.grab(edge) != newest);
+    desk.still(edge);
+    assert!(green(&desk.grab(edge)) > 200);
     desk.quit();
 }

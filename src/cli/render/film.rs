@@ -15,6 +15,7 @@ use insonify::output;
 use insonify::output::dicom::{self, About, Loop};
 use insonify::output::files;
 use insonify::output::movie::Movie;
+use insonify::output::mp4::Mp4;
 use insonify::output::picture::grey_png;
 use insonify::scene::Scene;
 use insonify::sim::Simulator;
@@ -41,6 +42,7 @@ pub struct Film {
 enum Reel {
     Images(Images),
     Movie(Movie),
+    Mp4(Mp4),
     Dicom(Loop),
     Sequence(Recording),
     Exchange(Box<Frames>, Format),
@@ -59,14 +61,18 @@ pub fn check(output: &Path, frames: u32) -> Result<()> {
         ));
     }
     let is_picture = ends(output, ["png", ""]);
-    let is_known = is_picture || Movie::is_meant(output) || dicom::is_meant(output);
+    let is_known =
+        is_picture || Movie::is_meant(output) || Mp4::is_meant(output) || dicom::is_meant(output);
     if !is_known && !is_sequence(output) && Format::of(output).is_none() {
         return Err(miette!(
-            help = "end the name in .png (pictures), .gif (an animation), .dcm (a loop in DICOM), .seq.mha or .seq.nrrd, \
+            help = "end the name in .png (pictures), .gif (an animation), .mp4 (a film), .dcm (a loop in DICOM), .seq.mha or .seq.nrrd, \
                     .uff or .hdf5 (data)",
             "{} is not written: its ending is that of no format that is known here",
             output.display()
         ));
+    }
+    if Mp4::is_meant(output) {
+        Mp4::check().into_diagnostic()?;
     }
     match is_picture {
         true => common::writable(&Images::new(output, frames).path(0)),
@@ -99,6 +105,8 @@ impl Film {
     ) -> Result<Self> {
         let reel = if Movie::is_meant(output) {
             Reel::Movie(Movie::new(output).into_diagnostic()?)
+        } else if Mp4::is_meant(output) {
+            Reel::Mp4(Mp4::new(output, shown))
         } else if dicom::is_meant(output) {
             Reel::Dicom(Loop::new(output, about(scene, simulator)))
         } else if is_sequence(output) {
@@ -156,6 +164,11 @@ impl Film {
                 frame.insert("shown_until_s".into(), json!(end));
                 movie.add(width, height, &rgba, end).into_diagnostic()?;
             }
+            Reel::Mp4(film) => {
+                let end = f64::from(index + 1) / self.shown;
+                frame.insert("shown_until_s".into(), json!(end));
+                film.add(width, height, &rgba, end).into_diagnostic()?;
+            }
             Reel::Dicom(film) => film.add(width, height, &rgba).into_diagnostic()?,
             Reel::Sequence(recording) => {
                 let pose = self.ras_from_world * scene.world_from_probe;
@@ -194,6 +207,12 @@ impl Film {
                 sidecar = Some(images.sidecar());
             }
             Reel::Movie(_) => {
+                output::line(output.display());
+                self.said.insert("file".into(), name(output));
+                sidecar = Some(output.with_extension("json"));
+            }
+            Reel::Mp4(film) => {
+                film.finish().into_diagnostic()?;
                 output::line(output.display());
                 self.said.insert("file".into(), name(output));
                 sidecar = Some(output.with_extension("json"));

@@ -27,7 +27,7 @@ impl Claim {
         for number in 1.. {
             let base = format!("{stem}-{number:04}");
             let is_taken = |end: &str| folder.join(format!("{base}{end}")).exists();
-            if ["", ".png", ".gif", "-marked.png", "-mmode.png"].into_iter().any(is_taken) {
+            if ["", ".png", ".gif", ".mp4", "-marked.png", "-mmode.png"].into_iter().any(is_taken) {
                 continue;
             }
             let path = folder.join(format!("{base}.json"));
