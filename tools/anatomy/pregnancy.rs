@@ -84,12 +84,12 @@ fn fused(command: &str) -> String {
 
 /// The mother's body, which the probe is held to; on its way to the mask sound passes it as it does what is around.
 fn skin() -> String {
-    let entry = |name: &str| {
+    let entry = |name: &str, priority: i32| {
         format!(
-            "[[mesh]]\nname = \"{name}\"\ntissue = \"mother_skin\"\npriority = -1\nfile = \"fetus/{name}.obj\"\n\n"
+            "[[mesh]]\nname = \"{name}\"\ntissue = \"mother_skin\"\npriority = {priority}\nfile = \"fetus/{name}.obj\"\n\n"
         )
     };
-    entry("body") + &entry("skin")
+    entry("body", -2) + &entry("skin", -1)
 }
 
 /// Comments of the scene with the volume.
