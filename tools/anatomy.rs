@@ -193,19 +193,26 @@ fn main() -> ExitCode {
     }
 }
 
+/// Triangles of the abdomen's surroundings.
+const AROUND: usize = 1_500;
+
 fn abdomen(budget: usize, output: &Path) -> Result<(), String> {
     let parts = abdomen::parts();
     let extent = Extent { low: body::LOW, high: body::HIGH, step: 4.0 };
     let surfaces = model::surfaces(&parts, extent, budget)?;
-    let total = model::count(&surfaces);
-    for (part, surface) in parts.iter().zip(&surfaces) {
+    let around = abdomen::around();
+    let shells = model::surfaces(&around, body::WHOLE, AROUND)?;
+    let total = model::count(&surfaces) + model::count(&shells);
+    for (part, surface) in parts.iter().chain(&around).zip(surfaces.iter().chain(&shells)) {
         let path = output.join("abdomen").join(format!("{}.obj", part.name));
         let axes = "x left, y posterior, z superior";
         output::write(&path, &output::obj(part.name, axes, surface))?;
     }
     let command = output::command("abdomen", budget, "", output);
     let path = output.join("abdomen.toml");
-    output::write(&path, &output::scene(&parts, "abdomen", &command, total))?;
-    println!("{total} triangles in {} meshes: {}", parts.len(), path.display());
+    let lessons = output::kept(&path, "[[pose]]");
+    let scene = output::scene(&parts, &around, "abdomen", &command, total);
+    output::write(&path, &(scene + &lessons))?;
+    println!("{total} triangles in {} meshes: {}", parts.len() + around.len(), path.display());
     Ok(())
 }

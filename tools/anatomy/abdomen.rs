@@ -67,6 +67,15 @@ pub fn parts() -> Vec<Part> {
     ]
 }
 
+/// What tells up from down: the body around the block, and the navel on it.
+pub fn around() -> Vec<Part> {
+    let p = &Point::world();
+    vec![
+        part("body", "body_skin", (10.0, 0.05), body::rest(p)),
+        part("navel", "skin", (2.0, 1.0), body::navel(p)),
+    ]
+}
+
 /// Thickness of the aortic wall, mm.
 const AORTIC_WALL: f32 = 1.6;
 

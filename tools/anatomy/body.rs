@@ -11,6 +11,8 @@ use crate::field::{
     Point, cone, difference, ellipsoid, elliptic_cylinder, intersection, undulation, union,
     union_all,
 };
+use crate::figure::figure;
+use crate::model::Extent;
 use crate::pose;
 
 /// Semi-axes of the torso's section, mm: 32 cm wide, 21 cm deep (NHANES, lean adult).
@@ -55,8 +57,45 @@ pub fn wall(p: &Point) -> Tree {
     let torso = elliptic_cylinder(p, TORSO.0, TORSO.1)
         + (pressed * -0.5).exp() * (pose::PRESS + GEL)
         + undulation(p, 0.6, 90.0, 0.4);
-    let block = intersection(p.0.clone() - 74.0, (p.2.clone() + 23.0).abs() - 147.0, 12.0);
+    let (left, middle, half) = BLOCK;
+    let block = intersection(p.0.clone() - left, (p.2.clone() - middle).abs() - half, 12.0);
     intersection(torso, block, 16.0)
+}
+
+/// Faces between which the block lies: to the left, and the middle and half of its height, mm.
+const BLOCK: (f32, f32, f32) = (74.0, -23.0, 147.0);
+
+/// How far the rest of the body reaches into the block, mm: to where its edges are no longer rounded.
+const OVERLAP: f32 = 16.0;
+
+/// The box that holds the whole body, mm.
+pub const WHOLE: Extent = Extent {
+    low: Vec3::new(-390.0, -130.0, -580.0),
+    high: Vec3::new(390.0, 130.0, 640.0),
+    step: 8.0,
+};
+
+/// Level of the shoulder joints, mm: 29 cm above the disc L1/L2.
+const SHOULDER: f32 = 290.0;
+
+/// The rest of the body, which has no layers: left side, head, arms and hips. It begins where the block ends, so that
+/// no ray meets it that stays in the block.
+pub fn rest(p: &Point) -> Tree {
+    // Within the block's skin where both overlap.
+    let column = elliptic_cylinder(p, TORSO.0 - 1.0, TORSO.1 - 1.0);
+    let trunk = intersection(column, (p.2.clone() + 20.0).abs() - 320.0, 40.0);
+    let (left, middle, half) = BLOCK;
+    let across = p.0.clone() - (left - OVERLAP);
+    let along = (p.2.clone() - middle).abs() - (half - OVERLAP);
+    let block = intersection(across, along, 4.0);
+    difference(trunk, block, 4.0).min(figure(p, SHOULDER))
+}
+
+/// The navel, at the level of the disc L3/L4: a ring of skin around a shallow pit.
+pub fn navel(p: &Point) -> Tree {
+    let q = p.from(Vec3::new(0.0, -TORSO.1, -66.0));
+    let ring = (q.0.square() + q.2.square() + 1e-4).sqrt() - 8.0;
+    (ring.square() + q.1.square() + 1e-4).sqrt() - 3.5
 }
 
 /// A layer of the wall: everything deeper than `depth` mm, wavy by `wave` mm.

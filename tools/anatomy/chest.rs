@@ -293,7 +293,7 @@ pub fn parts() -> Vec<Part> {
     let cavity = intersection(inside(p), dome(p) + 1.4, 3.0);
     let belly = intersection(inside(p) + 1.0, dome(p) + DIAPHRAGM, 3.0);
     vec![
-        part("body", "muscle", (9.0, 0.06), outer(p)),
+        part("body", "body_skin", (9.0, 0.06), outer(p)),
         part("skin", "skin", wall, skin(p)),
         part("fat", "fat", wall, deeper(p, skin(p), FAT)),
         part("chest-muscles", "muscle", wall, deeper(p, skin(p), MUSCLE)),

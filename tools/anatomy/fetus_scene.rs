@@ -7,10 +7,13 @@ use glam::{Quat, Vec3};
 use crate::check::Surface;
 use crate::fetus::{self, LIMBS, Limb, NECK, Node};
 use crate::part::Part;
-use crate::{model, output, womb};
+use crate::{figure, model, output, womb};
 
-/// Share of the triangles that the fetus has; the rest is the mother's.
+/// Shares of the triangles that the fetus has and the mother's body with its wall; the rest is her uterus with
+/// what lies in it and beside it.
 const FETUS: f64 = 0.62;
+/// See [`FETUS`].
+const WALL: f64 = 0.25;
 
 /// Resting place of the fetus in the sac, mm from its middle: on its back, a little below.
 const REST: Vec3 = Vec3::new(1.0, 0.0, 1.5);
@@ -29,9 +32,13 @@ pub fn make(budget: usize, output: &Path) -> Result<(), String> {
     let (nodes, parts): (Vec<Node>, Vec<Part>) = fetus::parts().into_iter().unzip();
     let share = (FETUS * budget as f64) as usize;
     let fetal = model::surfaces(&parts, fetus::EXTENT, share)?;
-    let mut mother = womb::outer();
-    mother.push(womb::inner());
-    let around = model::surfaces(&mother, womb::EXTENT, budget - share)?;
+    let wall = (WALL * budget as f64) as usize;
+    let mut mother = womb::wall();
+    let mut around = model::surfaces(&mother, womb::WHOLE, wall)?;
+    let mut organs = womb::outer();
+    organs.push(womb::inner());
+    around.extend(model::surfaces(&organs, womb::EXTENT, budget - share - wall)?);
+    mother.extend(organs);
 
     let folder = output.join("fetus");
     for ((part, node), surface) in parts.iter().zip(&nodes).zip(&fetal) {
@@ -50,14 +57,15 @@ pub fn make(budget: usize, output: &Path) -> Result<(), String> {
         "# A moving fetus of eleven weeks, {total} triangles, made by\n#   {command}\n# {}\n{HEAD}\n",
         fetus::biometry()
     );
+    out += figure::TISSUE;
     out += PELVIC;
     out += DECIDUAL;
     out += FETAL;
     out.push('\n');
     out += &contents(None, |name| Some(if name == "sac" { CHORION } else { "" }.to_owned()));
-    out.truncate(out.trim_end().len());
     let path = output.join("fetus.toml");
-    output::write(&path, &(out + "\n"))?;
+    out += &output::kept(&path, "[[pose]]");
+    output::write(&path, &(out.trim_end().to_owned() + "\n"))?;
     println!("{total} triangles: {}", path.display());
     Ok(())
 }
@@ -77,7 +85,7 @@ pub fn contents(carrier: Option<&str>, around: impl Fn(&str) -> Option<String>) 
         output::mesh_entry(name, tissue, priority, &rest)
     };
     let inner = womb::inner();
-    let outer = womb::outer();
+    let outer: Vec<Part> = womb::wall().into_iter().chain(womb::outer()).collect();
     let outer = outer.iter().filter_map(|p| Some((p, around(p.name)?)));
     let mut first = 0;
     for (part, last) in outer {
@@ -189,7 +197,7 @@ slice_thickness = "8 mm"
 
 # Gel, and skin that would yield to the pressed face.
 [contact]
-mesh = ["skin"]
+mesh = ["skin", "body"]
 gel = "5 mm"
 
 # Fluid attenuates less than the tissue that the curve assumes: the far sliders go down.

@@ -43,3 +43,11 @@ fn arm(q: &Point, side: f32) -> Tree {
     let hand = cone(q, wrist, 26.0, tip, 20.0);
     union_all(vec![upper, lower, hand], 14.0)
 }
+
+/// The tissue of what has no layers, for a scene file.
+pub const TISSUE: &str = r#"# Head, arms and hips: one tissue instead of layers, which the 3D view shows as skin.
+[tissues.body_skin]
+based_on = "muscle"
+source = "chosen by this project, no source found"
+
+"#;

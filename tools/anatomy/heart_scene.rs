@@ -5,6 +5,7 @@ use std::path::Path;
 use crate::beat::{self, KEYFRAMES, PERIOD};
 use crate::check::{self, Surface};
 use crate::chest::Placement;
+use crate::figure::TISSUE;
 use crate::part::Part;
 use crate::{chest, heart, model, output, overlap, valves, windows};
 
@@ -129,7 +130,7 @@ fn report(volumes: &[Vec<f64>]) {
 /// The scene file up to its poses; `counts` are the triangles of the heart and of the body around it.
 fn scene(beating: &[Part], around: &[Part], command: &str, [heart, body]: [usize; 2]) -> String {
     let mut out = format!(
-        "# A beating heart, {heart} triangles at a time, in a body of {body}, made by\n#   {command}\n{HEAD}\n\
+        "# A beating heart, {heart} triangles at a time, in a body of {body}, made by\n#   {command}\n{HEAD}\n{TISSUE}\
          [[selector]]\nname = \"beat\"\nperiod = \"{PERIOD} s\"\nstrategy = \"interpolate\" # smooth between the eight phases\n\n\
          # In rising priority: where two overlap, the later one wins.\n"
     );

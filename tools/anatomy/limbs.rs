@@ -87,7 +87,7 @@ pub fn make(budget: usize, spread: f64, output: &Path) -> Result<(), String> {
         let files = output::keyframes("limbs", name, STANCES.len());
         let rest = format!("parent = \"kicks\"\n{files}");
         out += "\n";
-        out += output::mesh_entry(name, tissue, 2 + priority, &rest).trim_end();
+        out += output::mesh_entry(name, tissue, 5 + priority, &rest).trim_end();
         out += "\n";
     }
     let path = output.join("limbs.toml");
@@ -97,28 +97,63 @@ pub fn make(budget: usize, spread: f64, output: &Path) -> Result<(), String> {
 }
 
 /// The lines before the meshes.
-const HEAD: &str = r#"# World frame, mm: that of the probe, x lateral, y elevation, z depth.
+const HEAD: &str = r#"# World frame, mm: that of the probe, x lateral, y elevation, z depth. A belly of ellipsoids: skin, fat,
+# muscle and the uterus around the fluid, as thick as in a lean woman at term (the uterus' wall 5-8 mm).
 name = "Limb in erratic motion"
-background = "amniotic_fluid"
+background = "gel"
 
 [probe]
 preset = "abdominal"
 depth = "130 mm"
 
-# Fluid takes next to nothing from the beam, so that nothing is to be made up for.
+# Gel, and skin that would yield to the pressed face and lie around it.
+[contact]
+mesh = ["belly"]
+gel = "14 mm"
+
+# The wall takes from the beam what the next sliders give back; fluid takes next to nothing.
 [imaging]
 tgc_attenuation = "0.15 dB/cm/MHz"
+tgc_sliders = [0, 4, 10, 12, 12, 12, 11, 10]
 
 [[selector]]
 name = "kicks"
 period = "2 s"
 
-# The far wall of the uterus.
 [[mesh]]
-name = "wall"
-shape = { box = { size = [300, 120, 40] } }
+name = "belly"
+shape = { ellipsoid = { radii = [170, 165, 120], subdivisions = 4 } }
+tissue = "skin"
+priority = 0
+translate = [0, 0, 121]
+
+[[mesh]]
+name = "fat"
+shape = { ellipsoid = { radii = [168, 163, 118], subdivisions = 4 } }
+tissue = "fat"
+priority = 1
+translate = [0, 0, 121]
+
+[[mesh]]
+name = "muscle"
+shape = { ellipsoid = { radii = [158, 153, 108], subdivisions = 4 } }
+tissue = "muscle"
+priority = 2
+translate = [0, 0, 121]
+
+[[mesh]]
+name = "uterus"
+shape = { ellipsoid = { radii = [150, 145, 54], subdivisions = 4 } }
 tissue = "uterus"
-translate = [0, 0, 140]
+priority = 3
+translate = [0, 0, 75]
+
+[[mesh]]
+name = "fluid"
+shape = { ellipsoid = { radii = [143, 138, 47], subdivisions = 4 } }
+tissue = "amniotic_fluid"
+priority = 4
+translate = [0, 0, 75]
 "#;
 
 /// Radius at share `u` of the length, smooth between the entries.

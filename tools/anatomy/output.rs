@@ -6,6 +6,7 @@ use std::path::Path;
 use glam::Vec3;
 
 use crate::check::Surface;
+use crate::figure;
 use crate::part::Part;
 use crate::pose::{self, Pose};
 
@@ -67,13 +68,19 @@ echogenicity = "-12 dB"
 const CONTACT: &str = r#"# Joined over a gap that gel alone would not fill: real skin yields and lies around the curved face,
 # which this one, being rigid, cannot.
 [contact]
-mesh = ["skin"]
+mesh = ["skin", "body", "navel"]
 gel = "9 mm"
 
 "#;
 
-/// The scene file for `parts`, whose meshes lie in `folder` beside it.
-pub fn scene(parts: &[Part], folder: &str, command: &str, triangles: usize) -> String {
+/// The scene file for `parts` and what is `around` them, whose meshes lie in `folder` beside it, up to its poses.
+pub fn scene(
+    parts: &[Part],
+    around: &[Part],
+    folder: &str,
+    command: &str,
+    triangles: usize,
+) -> String {
     let mut out = format!(
         "# An upper abdomen, {triangles} triangles, made by\n\
          #   {command}\n\
@@ -97,17 +104,21 @@ pub fn scene(parts: &[Part], folder: &str, command: &str, triangles: usize) -> S
     out += "\n";
     out += CONTACT;
     out += TISSUES;
-    out += "\n# In rising priority: where two overlap, the later one wins.\n";
-    for (priority, part) in parts.iter().enumerate() {
-        out += &format!(
+    out += "\n";
+    out += figure::TISSUE;
+    out += "# In rising priority: where two overlap, the later one wins.\n";
+    let entry = |part: &Part, priority: i32| {
+        format!(
             "[[mesh]]\nname = \"{name}\"\nfile = \"{folder}/{name}.obj\"\ntissue = \"{}\"\n\
              priority = {priority}\n\n",
             part.tissue,
             name = part.name,
-        );
-    }
-    out.truncate(out.trim_end().len());
-    out + "\n"
+        )
+    };
+    out.extend(parts.iter().zip(0..).map(|(part, priority)| entry(part, priority)));
+    out += "# Beside the block and on it.\n";
+    out.extend(around.iter().map(|part| entry(part, -1)));
+    out
 }
 
 /// The command that makes a scene, for its first lines; `options` begin with a blank.

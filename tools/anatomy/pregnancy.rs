@@ -76,10 +76,21 @@ fn fused(command: &str) -> String {
     });
     let out = format!(
         "# Fusion: a moving fetus of eleven weeks in a volume of a pelvis, made by\n#   {command}\n\
-         # {}\n{ABOUT}{head}{FUSION}{DECIDUAL}{FETAL}{BREATHING}\n{contents}",
-        fetus::biometry()
+         # {}\n{ABOUT}{head}{FUSION}{DECIDUAL}{FETAL}{BREATHING}\n{}{contents}",
+        fetus::biometry(),
+        skin()
     );
     out.trim_end().to_owned() + "\n"
+}
+
+/// The mother's body, which the probe is held to; on its way to the mask sound passes it as it does what is around.
+fn skin() -> String {
+    let entry = |name: &str, priority: i32| {
+        format!(
+            "[[mesh]]\nname = \"{name}\"\ntissue = \"mother_skin\"\npriority = {priority}\nfile = \"fetus/{name}.obj\"\n\n"
+        )
+    };
+    entry("body", -2) + &entry("skin", -1)
 }
 
 /// Comments of the scene with the volume.
@@ -111,6 +122,18 @@ based_on = "uterus"
 speed = "1540 m/s"
 attenuation = "0.68 dB/cm/MHz"
 source = "mean of fat, muscle and uterus by their thickness in front of the sac"
+
+# The same, under a name that the 3D view shows as skin.
+[tissues.mother_skin]
+based_on = "uterus"
+speed = "1540 m/s"
+attenuation = "0.68 dB/cm/MHz"
+source = "as `mother`"
+
+# Gel, and skin that would yield to the pressed face.
+[contact]
+mesh = ["skin", "body"]
+gel = "5 mm"
 
 "#;
 

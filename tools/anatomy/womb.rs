@@ -7,6 +7,7 @@ use fidget::context::Tree;
 use glam::Vec3;
 
 use crate::field::{Point, cone, difference, ellipsoid, intersection, undulation, union};
+use crate::figure::figure;
 use crate::model::Extent;
 use crate::part::{Part, part};
 
@@ -30,16 +31,62 @@ const LAYERS: [f32; 4] = [2.0, 11.0, 19.5, 22.0];
 /// Depth to which the middle of the face indents the skin, and the gel left between them, mm.
 const PRESS: (f32, f32) = (9.0, 1.5);
 
-/// Distance to the skin, negative inside; the probe's curve of radius 50 mm is pressed in and fades
-/// with depth.
-pub fn skin(p: &Point) -> Tree {
+/// Depth of the dent in the skin; the probe's curve of radius 50 mm is pressed in and fades with depth.
+fn dent(p: &Point) -> Tree {
     let gauss = |t: &Tree, sigma: f32| (t.clone() * (1.0 / sigma)).square();
     let pressed = gauss(&p.0, 23.0) + gauss(&p.1, 20.0) + gauss(&p.2, 40.0);
-    let dent = (pressed * -0.5).exp() * (PRESS.0 + PRESS.1) - PRESS.0;
-    let front = dent - p.2.clone() + undulation(p, 0.4, 70.0, 0.7);
+    (pressed * -0.5).exp() * (PRESS.0 + PRESS.1)
+}
+
+/// Distance to the skin of a block around the uterus, negative inside: as much as a sweep reaches.
+pub fn skin(p: &Point) -> Tree {
+    let front = dent(p) - PRESS.0 - p.2.clone() + undulation(p, 0.4, 70.0, 0.7);
     let block = intersection(p.0.clone().abs() - 90.0, p.1.clone().abs() - 54.0, 10.0);
     let block = intersection(block, p.2.clone() - 180.0, 8.0);
     intersection(front, block, 8.0)
+}
+
+/// Semi-axes of the mother's trunk, mm: 32 cm wide, 22 cm deep (ANSUR II, Gordon et al. 2014: women, waist).
+const TRUNK: (f32, f32) = (160.0, 110.0);
+
+/// The box that holds her, from the head to the knees.
+pub const WHOLE: Extent = Extent {
+    low: Vec3::new(-800.0, -390.0, -60.0),
+    high: Vec3::new(420.0, 390.0, 260.0),
+    step: 8.0,
+};
+
+/// Levels along x between which her wall has layers.
+const LAYERED: (f32, f32) = (-170.0, 150.0);
+
+/// Distance to the skin of her trunk between two levels; in front it is that of [`skin`].
+fn trunk(p: &Point, (from, to): (f32, f32)) -> Tree {
+    let (a, b) = TRUNK;
+    let axis = b - PRESS.0;
+    let section = Point(p.1.clone(), p.2.clone() - axis, Tree::from(0.0));
+    let round = ellipsoid(&section, Vec3::new(a, b, 1.0)) + dent(p) + undulation(p, 0.4, 70.0, 0.7);
+    let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
+    intersection(round, (p.0.clone() - middle).abs() - half, 30.0)
+}
+
+/// Distance to her skin with the navel, negative inside.
+fn belly(p: &Point) -> Tree {
+    // 15 cm above the pubic bone, which lies at 6 cm.
+    let navel = ellipsoid(&p.from(Vec3::new(-95.0, 0.0, -PRESS.0)), Vec3::new(10.0, 8.0, 9.0));
+    difference(trunk(p, LAYERED), navel, 6.0)
+}
+
+/// Her head, arms, upper belly and thighs: they say where up is, and have no layers.
+fn body(p: &Point) -> Tree {
+    let axis = TRUNK.1 - PRESS.0;
+    // To her left, her back and her head.
+    let own = Point(-p.1.clone(), p.2.clone() - axis, -p.0.clone());
+    let above = trunk(p, (-500.0, LAYERED.0 + 20.0));
+    let thigh = |side: f32| {
+        let from = Vec3::new(140.0, 80.0 * side, axis);
+        cone(p, from, 82.0, Vec3::new(400.0, 95.0 * side, axis), 62.0)
+    };
+    figure(&own, 470.0).min(above).min(thigh(1.0).min(thigh(-1.0)))
 }
 
 /// The sac, `wider` mm larger all around.
@@ -73,17 +120,25 @@ fn placenta(p: &Point) -> Tree {
     intersection(lens + undulation(p, 0.7, 17.0, 0.5), sac(p, DECIDUA + 2.0), 3.0)
 }
 
-/// All parts up to the fluid, in rising priority.
+/// The mother's body and the layers of her wall, in rising priority.
+pub fn wall() -> Vec<Part> {
+    let p = &Point::world();
+    let fineness = (6.0, 0.5);
+    let layer = |i: usize| belly(p) + LAYERS[i] + undulation(p, 0.6, 45.0, 1.0 + i as f32);
+    vec![
+        part("body", "body_skin", (10.0, 0.05), body(p)),
+        part("skin", "skin", fineness, belly(p)),
+        part("subcutaneous-fat", "fat", fineness, layer(0)),
+        part("rectus", "muscle", fineness, layer(1)),
+        part("preperitoneal-fat", "fat", fineness, layer(2)),
+        part("pelvis", "pelvis", fineness, layer(3)),
+    ]
+}
+
+/// Bladder, uterus and all in it up to the fluid, in rising priority.
 pub fn outer() -> Vec<Part> {
     let p = &Point::world();
-    let wall = (4.0, 0.8);
-    let layer = |i: usize| skin(p) + LAYERS[i] + undulation(p, 0.6, 45.0, 1.0 + i as f32);
     vec![
-        part("skin", "skin", wall, skin(p)),
-        part("subcutaneous-fat", "fat", wall, layer(0)),
-        part("rectus", "muscle", wall, layer(1)),
-        part("preperitoneal-fat", "fat", wall, layer(2)),
-        part("pelvis", "pelvis", wall, layer(3)),
         part("bladder-wall", "muscle", (2.5, 0.6), bladder(p, 0.0)),
         part("mother-bladder", "urine", (2.5, 0.6), bladder(p, 2.2)),
         part("uterus", "uterus", (3.0, 0.8), uterus(p)),
