@@ -6,6 +6,7 @@
 mod app;
 mod beside;
 mod bmode;
+mod body;
 mod calipers;
 mod captures;
 mod cine;

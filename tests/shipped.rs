@@ -5,8 +5,9 @@ use std::path::Path;
 use glam::DVec3;
 use insonify::gpu::test_device;
 use insonify::scene::Scene;
+use insonify::sim::contact::{Coupling, Skins};
 use insonify::sim::shaders::Library;
-use insonify::sim::{Simulator, Tracer};
+use insonify::sim::{Simulator, Tracer, seen};
 
 fn shipped(name: &str) -> Scene {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenes/{name}.toml"));
@@ -87,6 +88,82 @@ fn the_face_of_the_abdomens_probe_touches_the_skin() {
             let deeper = tissue(&scene, (origin + DVec3::Z * 10.0).into());
             assert_eq!(deeper, "fat", "line {l}, layer {e}");
         }
+    }
+}
+
+/// Of each window onto the heart: what is to be seen there, by its least area, mm2.
+const WINDOWS: [(&str, &[(&str, f64)]); 5] = [
+    (
+        "apical four-chamber",
+        &[
+            ("left-ventricle", 1500.0),
+            ("right-ventricle", 800.0),
+            ("left-atrium", 400.0),
+            ("right-atrium", 400.0),
+        ],
+    ),
+    ("apical two-chamber", &[("left-ventricle", 1500.0), ("left-atrium", 300.0)]),
+    (
+        "parasternal long axis",
+        &[
+            ("left-ventricle", 1000.0),
+            ("right-ventricle", 200.0),
+            ("left-atrium", 400.0),
+            ("aorta", 400.0),
+            ("mitral-valve", 20.0),
+        ],
+    ),
+    (
+        "parasternal short axis",
+        &[("left-ventricle", 800.0), ("right-ventricle", 400.0), ("papillary-muscles", 50.0)],
+    ),
+    (
+        "subcostal four-chamber",
+        &[
+            ("liver", 300.0),
+            ("left-ventricle", 500.0),
+            ("right-ventricle", 400.0),
+            ("right-atrium", 300.0),
+        ],
+    ),
+];
+
+#[test]
+fn every_window_onto_the_heart_shows_its_chambers() {
+    let mut scene = shipped("heart");
+    let (device, library) = (test_device(), Library::embedded());
+    let mut skins = Skins::default();
+    for (name, wanted) in WINDOWS {
+        let pose = scene.poses.iter().find(|pose| pose.name == name).expect(name);
+        scene.world_from_probe = pose.world_from_probe;
+        let coupling = Coupling::of(&scene, &mut skins).expect("a skin");
+        assert!(coupling.touch.share > 0.95, "{name}: {:?}", coupling.touch);
+        let instance =
+            |mesh: &str| scene.instances.iter().position(|i| i.name == mesh).expect(mesh);
+        let instances: Vec<usize> = wanted.iter().map(|(mesh, _)| instance(mesh)).collect();
+        let areas = seen::areas(&device, &library, &scene, Tracer::Bvh, &instances);
+        for ((mesh, least), area) in wanted.iter().zip(areas.expect("a frame")) {
+            println!("{name}: {mesh} {area:.0} mm2");
+            assert!(area > *least, "{name}: {mesh} {area} mm2");
+        }
+    }
+    // The comparison notices bone in front of the heart: the probe on the sternum.
+    let on = scene.poses.iter().find(|pose| pose.name == "parasternal long axis").expect("there");
+    let right = DVec3::new(-0.761, -0.213, 0.613);
+    let mut off = on.world_from_probe;
+    off.translation += 34.0 * right;
+    scene.world_from_probe = off;
+    let ventricle = scene.instances.iter().position(|i| i.name == "left-ventricle").expect("one");
+    let areas = seen::areas(&device, &library, &scene, Tracer::Bvh, &[ventricle]).expect("a frame");
+    assert!(areas[0] < 100.0, "{areas:?}");
+}
+
+#[test]
+fn the_probe_of_every_scene_with_a_skin_touches_it() {
+    for name in ["abdomen", "heart", "fetus", "pregnancy", "limbs"] {
+        let scene = shipped(name);
+        let coupling = Coupling::of(&scene, &mut Skins::default()).expect(name);
+        assert_eq!(coupling.touch.share, 1.0, "{name}");
     }
 }
 

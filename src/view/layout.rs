@@ -6,6 +6,7 @@ use egui::{Align2, CentralPanel, Frame as Space, Panel, RichText, Ui};
 use glam::DVec3;
 
 use super::bmode::{self, Place};
+use super::body;
 use super::console;
 use super::engine::Frame;
 use super::look::Pictured;
@@ -14,8 +15,8 @@ use super::model::mmode::Strip;
 use super::state::State;
 use super::statistics::Times;
 use super::{
-    beside, calipers, cine, deaths, ecg, exam, files, gallery, keys, leaving, lesson, mmode, naming,
-    notice, offer, planes, saved, strip, style, timing, view3d,
+    beside, calipers, cine, deaths, ecg, exam, files, gallery, keys, leaving, lesson, mmode,
+    naming, notice, offer, planes, saved, strip, style, timing, view3d,
 };
 use crate::settings::Exam;
 
@@ -148,7 +149,10 @@ pub(super) fn show(
             }
             calipers::table(ui, sheet, kind, frame, bare);
             if !bare {
-                strip::show(ui, &mut state.tools, sheet);
+                strip::show(ui, &mut state.tools, sheet, (&mut model.body, kind));
+            }
+            if let Some(mark) = &mut model.body {
+                body::show(ui, mark, bare);
             }
         }
         if let (Some(place), Some(frame), Some(strip)) = (&place, frame, &mut model.mmode) {

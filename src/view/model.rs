@@ -1,6 +1,7 @@
 //! The state behind the window, without the window: settings, pose of the probe, clock.
 
 mod age;
+pub mod body;
 pub mod calipers;
 mod camera;
 pub mod cine;
@@ -106,6 +107,8 @@ pub struct Model {
     filed_poses: Vec<NamedPose>,
     /// Measurements and texts.
     pub sheet: Sheet,
+    /// The body mark, where one is shown.
+    pub body: Option<body::BodyMark>,
     /// The marks at the last step of the history.
     noted_marks: Marks,
     history: History,
@@ -216,6 +219,7 @@ impl Model {
             poses: KnownPose::of(&scene.poses),
             filed_poses: scene.poses.clone(),
             sheet: Sheet::default(),
+            body: None,
             noted_marks: Marks::default(),
             history: History::default(),
             saves: 0,

@@ -6,10 +6,14 @@ use egui::{
     Align2, Color32, FontId, Id, Painter, Rect, Sense, Shape, Stroke, StrokeKind, Ui, pos2, vec2,
 };
 
+use super::body;
 use super::calipers::{cross, dots};
+use super::model;
+use super::model::body::BodyMark;
 use super::model::calipers::Kind;
 use super::model::sheet::{Sheet, Tool};
 use super::tools::Tools;
+use crate::settings::Exam;
 
 /// Height of a button with the gap below it, points; where there is little room, and otherwise.
 const PITCH: [f32; 2] = [26.0, 30.0];
@@ -86,17 +90,26 @@ fn film(p: &Painter, r: Rect, c: Color32) {
 }
 
 /// Draws the toolbar into the lower left corner.
-pub(super) fn show(ui: &mut Ui, tools: &mut Tools, sheet: &mut Sheet) {
+pub(super) fn show(
+    ui: &mut Ui,
+    tools: &mut Tools,
+    sheet: &mut Sheet,
+    (mark, exam): (&mut Option<BodyMark>, Exam),
+) {
     let area = ui.max_rect();
     let has_marks = !sheet.marks().is_empty();
     let pitch = PITCH[usize::from(area.height() > LITTLE)];
-    let height = pitch * (TOOLS.len() as f32 + 3.0) + 6.0;
+    let height = pitch * (TOOLS.len() as f32 + 4.0) + 6.0;
     let mut at = pos2(area.left() + 8.0, area.bottom() - 8.0 - height);
     let mut next = |gap: f32| {
         let rect = Rect::from_min_size(at, vec2(30.0, pitch - 2.0));
         at.y += pitch + gap;
         rect
     };
+    let tip = "Body mark: a figure with the probe; again for the next figure, at last for none";
+    if button(ui, next(0.0), mark.is_some(), true, tip, body::sign) {
+        *mark = model::body::next(*mark, exam);
+    }
     for (tool, tip, icon) in TOOLS {
         if button(ui, next(0.0), sheet.tool() == Some(tool), true, tip, icon) {
             sheet.toggle(tool);

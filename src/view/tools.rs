@@ -149,7 +149,8 @@ impl Tools {
 
     /// Returns whether a picture of the window is wanted.
     pub(super) fn wants_shot(&self, model: &Model) -> bool {
-        self.due == Some(Wanted::Still) && !model.sheet.marks().is_empty()
+        let marked = !model.sheet.marks().is_empty() || model.body.is_some();
+        self.due == Some(Wanted::Still) && marked
     }
 
     /// The marks that no saved image and no report holds.
@@ -186,6 +187,9 @@ impl Tools {
                 let mut sidecar = self.about(model, &frame);
                 sidecar.extend(settings(model, &frame, Some(&frame.pose)));
                 sidecar.extend(sidecar::marks(model.sheet.all(), &[frame.moment()]));
+                if let Some(body) = &model.body {
+                    sidecar.insert("body_mark".into(), body.json());
+                }
                 let still = Still { frame, sidecar, marked, strip: strip() };
                 self.captures.still(folder, stem, still);
             }

@@ -235,3 +235,50 @@ fn a_beating_scene_has_its_electrocardiogram() {
     assert!(green(&desk.grab(edge)) > 200);
     desk.quit();
 }
+
+#[test]
+fn a_body_mark_is_placed_turned_and_saved() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let captures = folder.path().join("captures");
+    let arguments = ["--captures", captures.to_str().expect("UTF-8"), "--validate"];
+    let scene = SCENE.replace("[imaging]", "[imaging]\nexam = \"vascular\"");
+    let Some(mut desk) = Desk::open(&scene, &arguments) else {
+        return;
+    };
+    desk.press(Key::Letter('c'));
+    desk.press(Key::Letter('v'));
+    desk.wait_for("an image", |d| brightness(&d.grab([500, 200, 300, 300])) > 10.0);
+    desk.press(Key::Space);
+    let room = [88, 546, 76, 76];
+    let before = brightness(&desk.grab(room));
+    // The topmost button of the tools.
+    desk.click((23, 414));
+    desk.wait_for("the figure", |d| brightness(&d.grab(room)) > before + 5.0);
+    desk.still(ALL);
+    desk.drag((126, 584), (144, 600));
+    // Its second end, 0.3 of half the figure to the right, goes down.
+    desk.drag((155, 600), (144, 625));
+    desk.still(ALL);
+    desk.press(Key::F2);
+    let said = sidecar(&mut desk, &captures, "cyst-and-wires-0001.json");
+    let mark = &said["body_mark"];
+    assert_eq!(mark["figure"], "neck");
+    let number = |value: &serde_json::Value| value.as_f64().expect("a number");
+    let [x, y] = [0, 1].map(|axis| number(&mark["probe"][axis]));
+    assert!((x - 18.0 / 38.0).abs() < 0.05 && (y - 16.0 / 38.0).abs() < 0.05, "{x} {y}");
+    assert!((number(&mark["turn_deg"]) - 90.0).abs() < 5.0, "{mark}");
+    assert!(captures.join("cyst-and-wires-0001-marked.png").exists(), "the figure is in a picture");
+    assert_eq!(
+        said["measurements"].as_array().map(Vec::len),
+        Some(0),
+        "the drags measured nothing"
+    );
+    // Through the other figures, and away.
+    for _ in 1..5 {
+        desk.click((23, 414));
+        desk.still(ALL);
+    }
+    desk.click((23, 414));
+    desk.wait_for("no figure", |d| brightness(&d.grab(room)) < before + 1.0);
+    desk.quit();
+}

@@ -142,7 +142,7 @@ fn undo_covers_the_probe_marks_and_recordings_which_another_does_not_replace() {
     desk.hold_control(Key::Letter('z'));
     desk.wait_for("it again", |d| difference(&d.grab(IMAGE), &marked) < 0.1);
     // A red sign while it records; another recording asks what becomes of this one.
-    let sign = [300, 0, 140, 28];
+    let sign = [414, 0, 140, 28];
     let red = |d: &Desk| d.grab(sign).chunks_exact(3).filter(|p| p[0] > 200 && p[2] < 90).count();
     assert_eq!(red(&desk), 0);
     desk.press(Key::Letter('r'));

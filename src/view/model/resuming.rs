@@ -60,6 +60,7 @@ impl Model {
         self.resume(old);
         self.sheet = std::mem::take(&mut old.sheet);
         self.noted_marks = std::mem::take(&mut old.noted_marks);
+        self.body = old.body;
         self.mmode = old.mmode.take();
         self.history = std::mem::take(&mut old.history);
         let names = |model: &Self| -> Vec<_> {
