@@ -191,7 +191,7 @@ fn the_phantom_is_one_gel_with_contrast_in_it() {
 fn the_pregnancy_has_its_fetus_in_a_small_volume_of_the_pelvis() {
     let scene = shipped("pregnancy");
     for (point, expected) in [
-        ([0.0, 0.0, 20.0], "mother"),
+        ([0.0, 0.0, 20.0], "mother_skin"),
         ([0.0, 0.0, 44.0], "decidua"),
         ([0.0, 0.0, 50.0], "amniotic_fluid"),
         ([2.0, 0.0, 69.0], "fetal_soft_tissue"),

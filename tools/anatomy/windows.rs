@@ -47,7 +47,7 @@ const WINDOWS: [Window; 4] = [
 ];
 
 /// Depth to which the probe is pressed in, mm.
-const PRESS: f32 = 1.5;
+const PRESS: f32 = 2.5;
 
 /// The `[[pose]]` entries, in the heart's frame.
 pub fn entries(placement: &Placement) -> String {
