@@ -119,12 +119,7 @@ const WINDOWS: [(&str, &[(&str, f64)]); 5] = [
     ),
     (
         "subcostal four-chamber",
-        &[
-            ("liver", 300.0),
-            ("left-ventricle", 500.0),
-            ("right-ventricle", 400.0),
-            ("right-atrium", 300.0),
-        ],
+        &[("left-ventricle", 500.0), ("right-ventricle", 400.0), ("right-atrium", 300.0)],
     ),
 ];
 

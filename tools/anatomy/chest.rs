@@ -252,7 +252,7 @@ fn dome(p: &Point) -> Tree {
 /// Thickness of the diaphragm, mm (Boussuges et al., Chest 2009: 2-3 mm at rest).
 const DIAPHRAGM: f32 = 2.8;
 
-/// Right lobe, and the left one that reaches below the heart: the window from below the ribs.
+/// Right lobe, and the left one that reaches below the heart.
 fn liver(p: &Point) -> Tree {
     let right = ellipsoid(&p.from(Vec3::new(-76.0, 0.0, -72.0)), Vec3::new(82.0, 98.0, 100.0));
     let left = ellipsoid(&p.from(Vec3::new(4.0, -56.0, -58.0)), Vec3::new(70.0, 62.0, 44.0));

@@ -38,7 +38,7 @@ const WINDOWS: [Window; 4] = [
         Vec3::new(0.0, -1.0, 0.0),
     ),
     (
-        // Through the liver: right atrium and ventricle in front, apex on the right.
+        // From below the ribs, above the liver: right atrium and ventricle in front, apex on the right.
         "subcostal four-chamber",
         Vec3::new(-8.0, -220.0, -52.0),
         Vec3::new(-20.0, 4.0, 92.0),
