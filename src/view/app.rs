@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
+use serde_json::json;
 use winit::application::ApplicationHandler;
 use winit::event::WindowEvent;
 use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoopProxy};
@@ -51,7 +52,12 @@ impl App {
     pub(super) fn finish(mut self) -> Result<(), ViewError> {
         self.open = None;
         if let Some(file) = &self.plan.options.json {
-            let text = format!("{:#}\n", self.statistics.report());
+            let mut report = self.statistics.report();
+            if let Some(link) = self.plan.link.report() {
+                let (sent, dropped) = (link.status.images_sent, link.status.images_dropped);
+                report["clients"] = json!({ "images_sent": sent, "images_dropped": dropped });
+            }
+            let text = format!("{report:#}\n");
             let written = std::fs::write(file, text);
             self.failure = self.failure.or(written.err().map(|e| unwritten(file, &e)));
         }

@@ -6,7 +6,7 @@ use glam::{DVec2, dvec2};
 use super::engine::{Frame, Sector};
 use super::framing::Framing;
 use super::model::Model;
-use super::{real, style};
+use super::{real, strip, style};
 use crate::probe::{Kind, Probe};
 
 /// Width below which the second row of text has no room for both sides, points.
@@ -14,6 +14,8 @@ const NARROW: f32 = 440.0;
 
 /// Room around the image, points: left (grey bar), top (texts), right (ruler), bottom.
 const MARGINS: [f32; 4] = [52.0, 58.0, 64.0, 16.0];
+/// Least height of the grey bar; with less room there is none, points.
+const LEAST_BAR: f32 = 30.0;
 /// Distance of the ruler from the image, points.
 const RULER: f32 = 12.0;
 /// Width of the time-gain curve between the grey bar and the image, points.
@@ -122,29 +124,27 @@ fn has_curve(area: Rect) -> bool {
     area.width() >= NARROW
 }
 
-/// Draws everything around the picture into the remaining room of the window.
-///
-/// `preparing` is the text while there is no picture yet.
+/// Says what is being done while there is no picture yet.
+pub(super) fn prepare(ui: &Ui, preparing: &str) {
+    let (area, font) = (ui.max_rect(), FontId::proportional(16.0));
+    ui.painter_at(area).text(area.center(), Align2::CENTER_CENTER, preparing, font, style::FAINT);
+}
+
+/// Draws everything around a picture in `area`; `held`: it is held beside the one that goes on.
 pub(super) fn show(
-    ui: &mut Ui,
-    frame: Option<&Frame>,
+    ui: &Ui,
+    area: Rect,
+    (frame, held): (&Frame, bool),
     model: &Model,
     framing: &Framing,
-    preparing: &str,
 ) -> Option<Place> {
-    let area = ui.max_rect();
     let painter = ui.painter_at(area);
-    let Some(frame) = frame else {
-        let font = FontId::proportional(16.0);
-        painter.text(area.center(), Align2::CENTER_CENTER, preparing, font, style::FAINT);
-        return None;
-    };
     let place = Place::new(area, frame, framing, ui.pixels_per_point());
     if !place.seen().is_positive() {
         // A window too small for any of it.
         return None;
     }
-    texts(&painter, area, frame, model, framing);
+    texts(&painter, area, (frame, held), model, framing);
     ruler(&painter, &place, frame);
     grey_bar(&painter, area, &place, frame);
     orientation(&painter, &place, frame);
@@ -153,7 +153,13 @@ pub(super) fn show(
     Some(place)
 }
 
-fn texts(painter: &egui::Painter, area: Rect, frame: &Frame, model: &Model, framing: &Framing) {
+fn texts(
+    painter: &egui::Painter,
+    area: Rect,
+    (frame, held): (&Frame, bool),
+    model: &Model,
+    framing: &Framing,
+) {
     let (probe, imaging) = (&frame.probe, &frame.settings.imaging);
     let kind = match probe.kind {
         Kind::Convex { .. } => "convex",
@@ -174,13 +180,14 @@ fn texts(painter: &egui::Painter, area: Rect, frame: &Frame, model: &Model, fram
     let below = at + vec2(0.0, 20.0);
     let left = painter.text(below, Align2::LEFT_TOP, settings, small.clone(), style::FAINT);
     let at = area.right_top() + vec2(-12.0, 8.0);
-    let (word, colour) = match model.frozen {
-        true => ("FROZEN", style::WARN),
-        false => ("LIVE", style::ACCENT),
+    let (word, colour) = match (held, model.frozen) {
+        (true, _) => ("HELD", style::WARN),
+        (false, true) => ("FROZEN", style::WARN),
+        (false, false) => ("LIVE", style::ACCENT),
     };
     painter.text(at, Align2::RIGHT_TOP, word, FontId::proportional(15.0), colour);
     let mut line = frame.grade.to_string();
-    if let (Some(ms), false) = (frame.grade.pace_ms, model.frozen) {
+    if let (Some(ms), false) = (frame.grade.pace_ms, model.frozen || held) {
         line = format!("{line}   {:.1} frames/s", 1e3 / ms.max(1e-3));
     }
     if model.animated {
@@ -276,11 +283,14 @@ pub(super) fn focus_mark(place: &Place, probe: &Probe) -> Pos2 {
 /// Draws the grey bar by the grey map: white on top, the lower end of the dynamic range at the bottom.
 fn grey_bar(painter: &egui::Painter, area: Rect, place: &Place, frame: &Frame) {
     let imaging = &frame.settings.imaging;
-    let height = (place.seen().height() * 0.4).clamp(60.0, 240.0);
-    let bar = Rect::from_min_size(
-        pos2(area.left() + 14.0, place.seen().top() + 16.0),
-        vec2(12.0, height),
-    );
+    let top = place.seen().top() + 16.0;
+    // Above the tools with the number at its lower end.
+    let room = strip::top(area) - 18.0 - top;
+    let height = (place.seen().height() * 0.4).clamp(60.0, 240.0).min(room);
+    if height < LEAST_BAR {
+        return;
+    }
+    let bar = Rect::from_min_size(pos2(area.left() + 14.0, top), vec2(12.0, height));
     const STEPS: u32 = 48;
     let mut mesh = Mesh::default();
     for i in 0..=STEPS {

@@ -12,7 +12,7 @@ use glam::DVec2;
 use super::bmode::Place;
 use super::engine::Frame;
 use super::model::calipers::{Caliper, Kind, Reading};
-use super::model::sheet::{Sheet, Tool, What};
+use super::model::sheet::{Mark, Sheet, Tool, What};
 use super::{keys, notes, style};
 use crate::exam;
 use crate::settings::Exam;
@@ -37,24 +37,14 @@ pub(super) fn show(
     frame: &Frame,
     (exam, listens, bare): (Exam, bool, bool),
 ) {
-    let room = ui.max_rect().intersect(place.seen().expand(12.0));
+    let room = place.area.intersect(place.seen().expand(12.0));
     pointer(ui, sheet, place, frame, (room, listens));
-    let painter = ui.painter_at(ui.max_rect());
+    let painter = ui.painter_at(place.area);
     for (index, mark) in sheet.marks().iter().enumerate() {
-        let mut colour = colour(mark.letter);
-        if mark.of != frame.moment() {
-            colour = colour.gamma_multiply(0.45);
-        }
-        match &mark.what {
-            What::Caliper(caliper) => {
-                draw(&painter, place, caliper, colour);
-                let at = to_screen(place, caliper.points[0]) + vec2(-7.0, -7.0);
-                letter(&painter, at, mark.letter, colour);
-            }
-            What::Note(note) if sheet.editing() != Some(index) => {
-                notes::write(&painter, place, note, colour);
-            }
-            What::Note(_) => {}
+        let strength = if mark.of == frame.moment() { 1.0 } else { 0.45 };
+        // A text that is being edited is the editor's.
+        if sheet.editing() != Some(index) {
+            draw_mark(&painter, place, mark, strength);
         }
     }
     if let Some((mark, point)) = sheet.selected().filter(|_| !bare) {
@@ -65,6 +55,35 @@ pub(super) fn show(
         draft(&painter, sheet, place);
     }
     notes::editor(ui, sheet, place, exam);
+}
+
+/// Draws marks that nobody changes, each with what it measures.
+pub(super) fn show_held(ui: &Ui, marks: &[Mark], place: &Place) {
+    let painter = ui.painter_at(place.area);
+    for mark in marks {
+        draw_mark(&painter, place, mark, 1.0);
+        if let What::Caliper(caliper) = &mark.what {
+            let end = to_screen(place, caliper.points[caliper.points.len() - 1]);
+            let mut words = reading(&caliper.reading());
+            if !caliper.label.is_empty() {
+                words.insert(0, caliper.label.clone());
+            }
+            label(&painter, end + vec2(14.0, -10.0), &words.join("  "), colour(mark.letter));
+        }
+    }
+}
+
+/// Draws a mark, fainter below a `strength` of 1.
+fn draw_mark(painter: &Painter, place: &Place, mark: &Mark, strength: f32) {
+    let colour = colour(mark.letter).gamma_multiply(strength);
+    match &mark.what {
+        What::Caliper(caliper) => {
+            draw(painter, place, caliper, colour);
+            let at = to_screen(place, caliper.points[0]) + vec2(-7.0, -7.0);
+            letter(painter, at, mark.letter, colour);
+        }
+        What::Note(note) => notes::write(painter, place, note, colour),
+    }
 }
 
 /// Where a right click on the image asks what lies there.

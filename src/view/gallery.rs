@@ -1,5 +1,6 @@
 //! Pictures of the scenes that ship, of which one can be opened.
 
+use std::path::PathBuf;
 use std::time::Instant;
 
 use egui::{
@@ -9,7 +10,7 @@ use egui::{
 use super::leaving::{self, Way};
 use super::model::Model;
 use super::state::State;
-use super::{FIRST_STEPS, style};
+use super::{FIRST_STEPS, recent, style};
 use crate::scene::shipped::{self, SCENES, Shipped};
 
 /// Room for one picture, points.
@@ -23,12 +24,14 @@ pub(super) struct Gallery {
     pub(super) open: bool,
     /// The reason why the last choice cannot be opened.
     problem: Option<String>,
+    /// Files that were opened last, as of when it was opened.
+    recent: Option<Vec<PathBuf>>,
 }
 
 impl Gallery {
     /// A gallery that is open or not.
     pub(super) fn new(open: bool) -> Self {
-        Self { open, problem: None }
+        Self { open, problem: None, recent: None }
     }
 }
 
@@ -36,8 +39,10 @@ impl Gallery {
 pub(super) fn show(ctx: &Context, model: &mut Model, state: &mut State, now: Instant) {
     let gallery = &mut state.gallery;
     if !gallery.open {
+        gallery.recent = None;
         return;
     }
+    let recent = gallery.recent.get_or_insert_with(recent::list);
     let mut open = !ctx.input(|input| input.key_pressed(Key::Escape));
     let window = egui::Window::new("Scenes")
         .anchor(Align2::CENTER_CENTER, [0.0, 0.0])
@@ -45,7 +50,8 @@ pub(super) fn show(ctx: &Context, model: &mut Model, state: &mut State, now: Ins
         .collapsible(false)
         .open(&mut open);
     let chosen = window.show(ctx, |ui| {
-        let chosen = pictures(ui);
+        let shipped = pictures(ui).map(|scene| shipped::unpacked(scene.name));
+        let chosen = shipped.or(lately(ui, recent).map(Ok));
         ui.separator();
         for line in FIRST_STEPS {
             ui.label(line);
@@ -56,16 +62,36 @@ pub(super) fn show(ctx: &Context, model: &mut Model, state: &mut State, now: Ins
         chosen
     });
     gallery.open = open;
-    let Some(scene) = chosen.and_then(|shown| shown.inner).flatten() else {
+    let Some(file) = chosen.and_then(|shown| shown.inner).flatten() else {
         return;
     };
-    match shipped::unpacked(scene.name) {
+    match file {
         Ok(path) => {
             *gallery = Gallery::new(false);
             leaving::leave(Way::Open(path), model, state, now);
         }
         Err(error) => gallery.problem = Some(error.to_string()),
     }
+}
+
+/// Draws the names of the files that were opened last; returns the one that was clicked.
+fn lately(ui: &mut Ui, recent: &[PathBuf]) -> Option<PathBuf> {
+    if recent.is_empty() {
+        return None;
+    }
+    ui.separator();
+    let shown = ui.horizontal_wrapped(|ui| {
+        ui.label("Opened lately:");
+        let mut chosen = None;
+        for file in recent {
+            let name = file.file_stem().unwrap_or_default().to_string_lossy();
+            if style::button(ui, &name, file.display().to_string()) {
+                chosen = Some(file.clone());
+            }
+        }
+        chosen
+    });
+    shown.inner
 }
 
 /// Draws all pictures with their names; returns the one that was clicked.

@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use egui::{Event, Key, Modifiers};
 
+use super::dual;
 use super::files::Purpose;
 use super::leaving::{self, Way};
 use super::mmode;
@@ -43,6 +44,7 @@ enum Action {
     Timing,
     Flip(usize),
     Whole,
+    Beside,
     Mmode,
     Real,
     Layer,
@@ -136,6 +138,11 @@ const BINDINGS: &[(&str, &[Binding], &str)] = &[
             (Key::Z, false, Action::Whole),
         ],
         "image: left and right, up and down exchanged; the whole of it (the wheel enlarges)",
+    ),
+    (
+        "Y",
+        &[(Key::Y, false, Action::Beside)],
+        "hold this image beside the live one; again: the other side (with Shift: one image)",
     ),
     (
         "Ctrl+Z Ctrl+Y",
@@ -306,6 +313,8 @@ fn carry_out(
         Action::Timing => state.timing = !state.timing,
         Action::Flip(axis) => state.framing.flip(axis),
         Action::Whole => state.framing.whole(),
+        Action::Beside if modifiers.shift => state.dual.end(),
+        Action::Beside => dual::hold(model, state, now),
         Action::Mmode => mmode::toggle(model, now),
         Action::Real => {
             model.real.shown = !model.real.shown;
@@ -354,6 +363,7 @@ mod tests {
         let rotate = Some(Action::Move(Axis::Rotate, -1.0));
         assert_eq!(action(Key::Q, Modifiers::NONE), rotate);
         assert_eq!(action(Key::Q, Modifiers::SHIFT), rotate, "a finer step");
-        assert_eq!(action(Key::Y, Modifiers::NONE), None);
+        assert_eq!(action(Key::Y, Modifiers::NONE), Some(Action::Beside));
+        assert_eq!(action(Key::Y, Modifiers::COMMAND), Some(Action::Redo));
     }
 }

@@ -15,7 +15,7 @@ use super::model::mmode::Strip;
 use super::state::State;
 use super::statistics::Times;
 use super::{
-    beside, calipers, cine, deaths, ecg, exam, files, gallery, keys, leaving, lesson, mmode,
+    beside, calipers, cine, deaths, dual, ecg, exam, files, gallery, keys, leaving, lesson, mmode,
     naming, notice, offer, planes, saved, strip, style, timing, view3d,
 };
 use crate::settings::Exam;
@@ -33,6 +33,8 @@ const LEAST_IMAGE: f32 = 200.0;
 pub(super) struct Places {
     /// The B-mode image.
     pub(super) image: Option<Place>,
+    /// The one that is held beside it.
+    pub(super) held: Option<Place>,
     /// The 3D view.
     pub(super) view3d: Option<view3d::Place>,
 }
@@ -127,48 +129,12 @@ pub(super) fn show(
             .show(ui, |ui| exam::show(ui, model, state));
     }
     let centre = CentralPanel::default().frame(Space::NONE);
-    let place = centre.show(ui, |ui| {
-        if alone {
-            return None;
-        }
-        let place = bmode::show(ui, frame, model, &state.framing, state.preparing);
-        // A picture to be saved has its marks and nothing that is pressed.
-        let bare = state.tools.wants_shot(model);
-        state.tools.cleared = bare;
-        let (sheet, listens) = (&mut model.sheet, !state.has_dialog());
-        let kind = model.settings.imaging.exam;
-        if let (Some(place), Some(frame)) = (&place, frame) {
-            calipers::show(ui, sheet, place, frame, (kind, listens, bare));
-            let newest = state.tools.cine.newest().map(|newest| newest.seconds);
-            ecg::show(ui, place, (frame, newest), model.beat.filter(|_| kind == Exam::Cardiac));
-            state.framing.follow(ui, place);
-            if let Some(at) = calipers::asked(ui, place) {
-                let mm = place.mm(at);
-                let point = frame.pose.transform_point3(DVec3::new(mm.x, 0.0, mm.y));
-                state.asked = Some((at, naming::Question::Place(point)));
-            }
-            calipers::table(ui, sheet, kind, frame, bare);
-            if !bare {
-                strip::show(ui, &mut state.tools, sheet, (&mut model.body, kind));
-            }
-            if let Some(mark) = &mut model.body {
-                body::show(ui, mark, bare);
-            }
-        }
-        if let (Some(place), Some(frame), Some(strip)) = (&place, frame, &mut model.mmode) {
-            mmode::aim(ui, place, frame, strip, model.frozen);
-        }
-        if let Some(place) = place.as_ref().filter(|_| !bare) {
-            beside::show(ui, place, model, now);
-        }
-        if !bare {
-            notice::show(ui, &mut state.inputs);
-            notice::recording(ui, model, now);
-            saved::show(ui, &mut state.tools);
-            notice::stale(ui, state.stale.as_deref());
-        }
-        place
-    });
+    let (image, held) = centre
+        .show(ui, |ui| match alone {
+            true => (None, None),
+            false => images(ui, model, state, frame, now),
+        })
+        .inner;
     if let Some(width) = room {
         view3d::divide(ui, both, width, &mut state.share);
     }
@@ -198,7 +164,66 @@ pub(super) fn show(
     if state.help {
         help(ui.ctx(), &mut state.help);
     }
-    Places { image: place.inner, view3d }
+    Places { image, held, view3d }
+}
+
+/// Draws what belongs to the image, and to one that is held beside it; returns their places.
+fn images(
+    ui: &mut Ui,
+    model: &mut Model,
+    state: &mut State,
+    frame: Option<&Frame>,
+    now: Instant,
+) -> (Option<Place>, Option<Place>) {
+    // A picture to be saved has its marks and nothing that is pressed.
+    let bare = state.tools.wants_shot(model, &state.dual);
+    let [room, beside] = state.dual.rooms(ui.max_rect());
+    let held = state.dual.show(ui, (beside, bare), model, &state.framing);
+    let place = match frame {
+        Some(frame) => bmode::show(ui, room, (frame, false), model, &state.framing),
+        None => {
+            bmode::prepare(ui, state.preparing);
+            None
+        }
+    };
+    state.tools.cleared = bare;
+    let (sheet, listens) = (&mut model.sheet, !state.has_dialog());
+    let kind = model.settings.imaging.exam;
+    if let (Some(place), Some(frame)) = (&place, frame) {
+        calipers::show(ui, sheet, place, frame, (kind, listens, bare));
+        let newest = state.tools.cine.newest().map(|newest| newest.seconds);
+        ecg::show(ui, place, (frame, newest), model.beat.filter(|_| kind == Exam::Cardiac));
+        state.framing.follow(ui, place);
+        if let Some(at) = calipers::asked(ui, place) {
+            let mm = place.mm(at);
+            let point = frame.pose.transform_point3(DVec3::new(mm.x, 0.0, mm.y));
+            state.asked = Some((at, naming::Question::Place(point)));
+        }
+        calipers::table(ui, sheet, kind, frame, bare);
+        if !bare {
+            let dual = state.dual.is_on();
+            let mark = (&mut model.body, kind, dual);
+            if strip::show(ui, &mut state.tools, sheet, mark) {
+                dual::hold(model, state, now);
+            }
+        }
+        if let Some(mark) = &mut model.body {
+            body::show(ui, mark, bare);
+        }
+    }
+    if let (Some(place), Some(frame), Some(strip)) = (&place, frame, &mut model.mmode) {
+        mmode::aim(ui, place, frame, strip, model.frozen);
+    }
+    if let Some(place) = place.as_ref().filter(|_| !bare) {
+        beside::show(ui, place, model, now);
+    }
+    if !bare {
+        notice::show(ui, &mut state.inputs);
+        notice::recording(ui, model, now);
+        saved::show(ui, &mut state.tools);
+        notice::stale(ui, state.stale.as_deref());
+    }
+    (place, held)
 }
 
 /// Buttons that open the panels.

@@ -46,6 +46,8 @@ pub(super) struct Open {
     look: Option<Look>,
     /// True until the picture has been on the screen.
     fresh: bool,
+    /// Number of pictures that were replaced before they came to the screen, until it is noted.
+    unseen: u64,
     /// Times of the last pictures of the 3D view, ms, until they are noted.
     pictures_ms: Vec<f64>,
     /// Arrival of the last input.
@@ -112,9 +114,10 @@ impl Open {
                     }
                     self.model.film(&frame, film);
                     self.state.tools.record((*frame).clone());
+                    self.state.dual.refine(&frame);
                     self.state.view3d.pace(frame.grade.budget_ms);
                     self.frame = Some(*frame);
-                    self.fresh = true;
+                    self.unseen += u64::from(std::mem::replace(&mut self.fresh, true));
                     self.state.problem = None;
                 }
                 News::View3d(pictured) => {

@@ -18,6 +18,8 @@ pub(super) struct State {
     pub(super) console: bool,
     /// The part of the image that is seen.
     pub(super) framing: super::framing::Framing,
+    /// An image that is held beside the one that goes on.
+    pub(super) dual: super::dual::Dual,
     /// True while the timing panel is open.
     pub(super) timing: bool,
     /// The 3D view.

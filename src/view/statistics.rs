@@ -35,11 +35,19 @@ pub(super) struct Times {
     interface: VecDeque<f64>,
     /// Durations of the 3D view's pictures on the device.
     view3d: VecDeque<f64>,
+    /// Number of pictures that have been on the screen, and of those that a newer one had replaced before.
+    seen: [u64; 2],
 }
 
 impl Times {
     pub(super) fn add(&mut self, sample: Sample) {
+        self.seen[0] += 1;
         push(&mut self.samples, sample);
+    }
+
+    /// Notes pictures that never came to the screen: a newer one was there before.
+    pub(super) fn add_unseen(&mut self, count: u64) {
+        self.seen[1] += count;
     }
 
     /// Notes a frame of the window, ms.
@@ -120,6 +128,7 @@ impl Times {
         let stages = stages.iter().map(|name| (name.clone(), both(&self.stage(name))));
         json!({
             "frames": self.samples.len(),
+            "images": { "shown": self.seen[0], "unseen": self.seen[1] },
             "stages_ms": stages.collect::<Map<_, _>>(),
             "device_ms": both(&self.of(Sample::device)),
             "frame_ms": both(&self.live(|s| s.wall)),

@@ -89,23 +89,45 @@ fn film(p: &Painter, r: Rect, c: Color32) {
     p.add(Shape::convex_polygon(corners, c, Stroke::NONE));
 }
 
-/// Draws the toolbar into the lower left corner.
+fn halves(p: &Painter, r: Rect, c: Color32) {
+    let (left, right) = r.expand2(vec2(3.0, 1.0)).split_left_right_at_fraction(0.5);
+    p.rect_filled(left.shrink(1.0), 1.0, c);
+    p.rect_stroke(right.shrink(1.0), 1.0, Stroke::new(1.2, c), StrokeKind::Middle);
+}
+
+/// Height of the toolbar in an area so high, points.
+fn height(area: f32) -> f32 {
+    pitch(area) * (TOOLS.len() as f32 + 5.0) + 6.0
+}
+
+fn pitch(area: f32) -> f32 {
+    PITCH[usize::from(area > LITTLE)]
+}
+
+/// Upper edge of the toolbar in the area of the images: what stands at the left keeps above it.
+pub(super) fn top(area: Rect) -> f32 {
+    area.bottom() - 8.0 - height(area.height())
+}
+
+/// Draws the toolbar into the lower left corner; returns whether the image is to be held beside the live one.
 pub(super) fn show(
     ui: &mut Ui,
     tools: &mut Tools,
     sheet: &mut Sheet,
-    (mark, exam): (&mut Option<BodyMark>, Exam),
-) {
+    (mark, exam, dual): (&mut Option<BodyMark>, Exam, bool),
+) -> bool {
     let area = ui.max_rect();
     let has_marks = !sheet.marks().is_empty();
-    let pitch = PITCH[usize::from(area.height() > LITTLE)];
-    let height = pitch * (TOOLS.len() as f32 + 4.0) + 6.0;
-    let mut at = pos2(area.left() + 8.0, area.bottom() - 8.0 - height);
+    let pitch = pitch(area.height());
+    let mut at = pos2(area.left() + 8.0, top(area));
     let mut next = |gap: f32| {
         let rect = Rect::from_min_size(at, vec2(30.0, pitch - 2.0));
         at.y += pitch + gap;
         rect
     };
+    let has_image = !tools.cine.is_empty();
+    let tip = "Hold this image beside the live one; again: the other side (Y)";
+    let held = button(ui, next(0.0), dual, has_image, tip, halves);
     let tip = "Body mark: a figure with the probe; again for the next figure, at last for none";
     if button(ui, next(0.0), mark.is_some(), true, tip, body::sign) {
         *mark = model::body::next(*mark, exam);
@@ -119,7 +141,6 @@ pub(super) fn show(
     if button(ui, next(6.0), false, has_marks, tip, bin) {
         sheet.clear();
     }
-    let has_image = !tools.cine.is_empty();
     let tip = "Save this image: PNG and sidecar (F2)";
     if button(ui, next(0.0), false, has_image, tip, camera) {
         tools.want_still();
@@ -128,6 +149,7 @@ pub(super) fn show(
     if button(ui, next(0.0), false, has_image, tip, film) {
         tools.want_clip();
     }
+    held
 }
 
 fn button(ui: &mut Ui, rect: Rect, on: bool, enabled: bool, tip: &str, icon: Icon) -> bool {

@@ -8,6 +8,7 @@ use glam::{DAffine3, DVec2};
 use serde_json::{Value, json};
 
 use super::captures::{Captures, Clip, Format, SavedStrip, Sidecar, Still};
+use super::dual::Dual;
 use super::engine::Frame;
 use super::model::cine::Limit;
 use super::model::sheet::{Mark, Marks, Moment, Sheet};
@@ -148,8 +149,8 @@ impl Tools {
     }
 
     /// Returns whether a picture of the window is wanted.
-    pub(super) fn wants_shot(&self, model: &Model) -> bool {
-        let marked = !model.sheet.marks().is_empty() || model.body.is_some();
+    pub(super) fn wants_shot(&self, model: &Model, dual: &Dual) -> bool {
+        let marked = !model.sheet.marks().is_empty() || model.body.is_some() || dual.is_on();
         self.due == Some(Wanted::Still) && marked
     }
 

@@ -9,6 +9,7 @@ use super::{Purpose, said};
 use crate::scene::SceneError;
 use crate::view::leaving::{self, Way};
 use crate::view::model::Model;
+use crate::view::recent;
 use crate::view::state::State;
 use crate::view::style::{self, button};
 
@@ -27,6 +28,8 @@ pub(in crate::view) struct Dialog {
     folder: PathBuf,
     /// Names of folders, which end in a slash, and scene files in `folder`.
     listed: Vec<String>,
+    /// Scene files that were opened last.
+    recent: Vec<PathBuf>,
     /// Whether the file at `path` is to be replaced has been asked.
     replaces: bool,
 }
@@ -40,6 +43,7 @@ impl Dialog {
             // Not yet looked into.
             folder: PathBuf::from("\0"),
             listed: Vec::new(),
+            recent: recent::list(),
             replaces: false,
         }
     }
@@ -143,6 +147,9 @@ fn contents(
         dialog.edited();
     }
     let confirmed = field.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
+    if dialog.purpose == Purpose::Load {
+        lately(ui, dialog);
+    }
     list(ui, dialog);
     if let Some(error) = &dialog.error {
         ui.label(RichText::new(error).color(style::WARN));
@@ -164,6 +171,26 @@ fn contents(
         field.request_focus();
     }
     is_done
+}
+
+/// Draws the menu of the scene files that were opened last.
+fn lately(ui: &mut Ui, dialog: &mut Dialog) {
+    if dialog.recent.is_empty() {
+        return;
+    }
+    let mut chosen = None;
+    ui.menu_button("Opened lately", |ui| {
+        for file in &dialog.recent {
+            let name = file.to_string_lossy();
+            if ui.button(name.as_ref()).clicked() {
+                chosen = Some(name.into_owned());
+                ui.close();
+            }
+        }
+    });
+    if let Some(path) = chosen {
+        dialog.choose(path);
+    }
 }
 
 /// Draws the folders and scene files to choose from.

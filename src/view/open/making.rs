@@ -21,7 +21,7 @@ use crate::view::opening::{self, Opened};
 use crate::view::session::{self, Session};
 use crate::view::state::State;
 use crate::view::watch::Watch;
-use crate::view::{Model, ViewError, planes, style, timing, view3d};
+use crate::view::{Model, ViewError, planes, recent, style, timing, view3d};
 
 /// Input for a window on `device`, its interface `zoom` times as large as usual. The textures of an
 /// earlier interface are lost with its device: this one sends them again.
@@ -62,6 +62,7 @@ impl Open {
         let state = State {
             console: true,
             framing: Default::default(),
+            dual: Default::default(),
             timing: false,
             view3d: view3d::State::default(),
             share: view3d::USUAL,
@@ -105,6 +106,7 @@ impl Open {
         window.request_redraw();
         let watch = Watch::new(session::waker(plan.proxy.clone())).map_err(ViewError::Thread)?;
         watch.set(&plan.options.file);
+        recent::add(&plan.options.file);
         Ok((Self::with(session, model, state, (input, window), watch), log))
     }
 
@@ -134,6 +136,7 @@ impl Open {
         // Everything on the lost device is dropped before there is another.
         drop((frame, pictured));
         state.tools.lose();
+        state.dual.end();
         drop(session);
         let device = session::device(&plan.options, &window)?;
         // Its texture is lost with the device.
@@ -166,6 +169,7 @@ impl Open {
             model,
             state,
             fresh: false,
+            unseen: 0,
             pictures_ms: Vec::new(),
             touched: Instant::now(),
             painted: (Instant::now(), Duration::ZERO),

@@ -4,6 +4,7 @@ use std::time::{Duration, Instant};
 
 use super::{Open, gestures};
 use crate::gpu::{GpuError, InterfaceFrame, Painted, PlacedImage, Screenshot};
+use crate::view::bmode::Place;
 use crate::view::engine::Frame;
 use crate::view::layout::{self, Places};
 use crate::view::statistics::{Sample, Times};
@@ -46,10 +47,15 @@ impl Open {
         let primitives = context.tessellate(std::mem::take(&mut output.shapes), scale);
         let model = &self.model;
         let image = shown.as_ref().map(|frame| real::image(frame, model));
+        let held = self.state.dual.frame().map(|frame| real::image(frame, model));
         let view3d = self.pictured.as_ref().map(|pictured| &pictured.image);
+        let seen = places.view3d.zip(self.pictured.as_ref());
+        let seen = seen.map(|(place, pictured)| place.of(pictured));
+        let within = |place: &Place| (place.rect, place.room, place.flipped);
         let rects = [
-            (image, places.image.as_ref().map(|place| (place.rect, place.room, place.flipped))),
-            (view3d, places.view3d.map(|place| (place.rect, place.rect, [false; 2]))),
+            (image, places.image.as_ref().map(within)),
+            (held, places.held.as_ref().map(within)),
+            (view3d, seen.map(|place| (place.rect, place.rect, [false; 2]))),
         ];
         let placed: Vec<PlacedImage> = (rects.into_iter())
             .filter_map(|(image, rect)| {
@@ -78,7 +84,7 @@ impl Open {
         let size = [size.width, size.height];
         let painter = &mut self.session.painter;
         let tools = &mut self.state.tools;
-        let wanted = tools.wants_shot(&self.model) && painter.can_be_read();
+        let wanted = tools.wants_shot(&self.model, &self.state.dual) && painter.can_be_read();
         let marked = wanted && tools.cleared;
         let painted = painter.paint(size, &placed, interface, shot || marked)?;
         self.session.engine.drawn();
@@ -87,7 +93,8 @@ impl Open {
             Painted::Skipped => None,
         };
         let around = picture.zip(places.image.as_ref()).map(|(picture, place)| {
-            let r = place.area * scale;
+            let both = places.held.as_ref().map_or(place.area, |held| place.area.union(held.area));
+            let r = both * scale;
             cropped(picture, [r.left(), r.top(), r.right(), r.bottom()])
         });
         let strip = || mmode::saved(&self.model, &self.state.mmode);
@@ -135,6 +142,7 @@ impl Open {
     /// Notes that the picture has been handed to the screen.
     fn seen(&mut self, times: &mut Times) {
         (self.pictures_ms.drain(..)).for_each(|ms| times.add_view3d(ms));
+        times.add_unseen(std::mem::take(&mut self.unseen));
         if !std::mem::take(&mut self.fresh) {
             return;
         }

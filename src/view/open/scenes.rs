@@ -8,6 +8,7 @@ use crate::view::inputs::name;
 use crate::view::leaving::{self, Way};
 use crate::view::naming;
 use crate::view::opening::{Opened, Opening, Purpose};
+use crate::view::recent;
 
 /// Reason for which no scene is opened.
 const STOPPED: &str = "The simulation stands still. Start it again first, then open the scene.";
@@ -24,6 +25,7 @@ impl Open {
         if std::mem::replace(&mut self.saved, model.saves()) != model.saves() {
             // Own writing is no change.
             self.watch.set(&model.file.path);
+            recent::add(&model.file.path);
         }
         let begin = |path, overrides, purpose| {
             Some(Opening::begin(path, overrides, purpose, plan.proxy.clone()))
@@ -103,6 +105,7 @@ impl Open {
                 .notices
                 .tell(format!("{} was read again", name(&self.model.file.path)));
         } else {
+            recent::add(&model.file.path);
             self.replace(model);
         }
         plan.scene = scene;
@@ -116,6 +119,7 @@ impl Open {
         self.frame = None;
         (self.pictured, self.look) = (None, None);
         self.state.tools.lose();
+        self.state.dual.end();
         self.state.mmode = Default::default();
         self.state.poses = Default::default();
         self.state.planes = Default::default();

@@ -1,0 +1,42 @@
+//! The scene files that were opened last, in the system's folder for the state of programs.
+
+use std::path::{Path, PathBuf};
+
+use crate::output::files;
+use crate::scene::shipped;
+
+/// Most files that are remembered.
+const MOST: usize = 8;
+
+/// The files that were opened last and still exist, the newest first.
+pub(super) fn list() -> Vec<PathBuf> {
+    let text = place().and_then(|place| std::fs::read_to_string(place).ok()).unwrap_or_default();
+    let files = text.lines().map(PathBuf::from);
+    files.filter(|file| file.is_file()).take(MOST).collect()
+}
+
+/// Puts a file at the head of the list, unless it ships: the gallery shows those. Where the list cannot be written it stays
+/// as it is: nothing depends on it.
+pub(super) fn add(file: &Path) {
+    let (Some(place), Ok(file)) = (place(), file.canonicalize()) else { return };
+    if shipped::is_shipped(&file) {
+        return;
+    }
+    let known = list();
+    if known.first() == Some(&file) {
+        return;
+    }
+    let lines: Vec<String> = std::iter::once(&file)
+        .chain(known.iter().filter(|known| **known != file))
+        .take(MOST)
+        // A name of several lines is no line of the list.
+        .filter_map(|file| file.to_str().filter(|name| !name.contains('\n')).map(str::to_owned))
+        .collect();
+    let made = place.parent().map_or(Ok(()), std::fs::create_dir_all);
+    let _ = made.and_then(|()| files::replace(&place, (lines.join("\n") + "\n").as_bytes()));
+}
+
+fn place() -> Option<PathBuf> {
+    let state = dirs::state_dir().or_else(dirs::data_local_dir);
+    state.map(|folder| folder.join("insonify").join("recent"))
+}
