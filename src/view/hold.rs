@@ -129,7 +129,7 @@ fn drag_at(ui: &Ui, at: Pos2, place: &Place, model: &mut Model, now: Instant) ->
     }
     let held = model.spot_held(now)?;
     let off = place.project(&camera, held.point)? - at;
-    Some(match model.view3d.cut {
+    Some(match model.view3d.cuts(&model.pose) {
         true => Drag::InPlane(off),
         false => Drag::Over(off),
     })
@@ -137,7 +137,7 @@ fn drag_at(ui: &Ui, at: Pos2, place: &Place, model: &mut Model, now: Instant) ->
 
 /// The skin seen at a screen position.
 fn spot_at(at: Pos2, place: &Place, model: &mut Model, now: Instant) -> Option<Spot> {
-    let seen = match model.view3d.cut {
+    let seen = match model.view3d.cuts(&model.pose) {
         true => Seen::BehindPlane,
         false => Seen::Whole,
     };
@@ -211,6 +211,28 @@ fn is_near(line: &[Pos2], at: Pos2) -> bool {
     })
 }
 
+/// The convex hull of points, around it once (the monotone chain of Andrew 1979).
+fn hull(mut points: Vec<Pos2>) -> Vec<Pos2> {
+    points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
+    let half = |points: &mut dyn Iterator<Item = &Pos2>| {
+        let mut chain: Vec<Pos2> = Vec::new();
+        for &point in points {
+            while let [.., a, b] = chain[..]
+                && (b - a).x * (point - b).y - (b - a).y * (point - b).x <= 0.0
+            {
+                chain.pop();
+            }
+            chain.push(point);
+        }
+        // Its end begins the other half.
+        chain.pop();
+        chain
+    };
+    let mut around = half(&mut points.iter());
+    around.extend(half(&mut points.iter().rev()));
+    around
+}
+
 /// Returns whether a polygon encloses a point: a ray to the right crosses it an odd number of times.
 fn encloses(polygon: &[Pos2], at: Pos2) -> bool {
     let sides = polygon.iter().zip(polygon.iter().cycle().skip(1));
@@ -237,22 +259,22 @@ fn hover(ui: &Ui, at: Pos2, place: &Place, model: &mut Model, now: Instant) {
     ghost(&painter, place, &camera, &pose, &model.settings.probe);
 }
 
-/// Draws the outline of the face and the direction into the body.
+/// Draws the probe's head as it would stand there, see-through, with the row of elements on its face: from every side
+/// it is seen which way it looks.
 fn ghost(painter: &Painter, place: &Place, camera: &Camera, pose: &DAffine3, probe: &Probe) {
     let seen = |point: DVec3| place.project(camera, pose.transform_point3(point));
     let [r, g, b, _] = style::ACCENT.to_array();
     let colour = Color32::from_rgba_unmultiplied(r, g, b, 190);
     let line = Stroke::new(1.6, colour);
-    let edge = |along: f64| {
-        let points = (0..=16).map(move |i| (f64::from(i) / 16.0 - 0.5, along));
-        points.filter_map(|(across, along)| seen(probe.face(across, along).0))
+    let row = |along: f64, lift: f64| {
+        let points = (0..=16).map(|i| probe.face(f64::from(i) / 16.0 - 0.5, along).0);
+        points.filter_map(|point| seen(point + DVec3::NEG_Z * lift)).collect::<Vec<Pos2>>()
     };
-    let rim: Vec<Pos2> =
-        edge(-0.5).chain(edge(0.5).collect::<Vec<_>>().into_iter().rev()).collect();
-    painter.add(Shape::closed_line(rim, line));
-    if let (Some(from), Some(to)) = (seen(DVec3::ZERO), seen(DVec3::Z * 30.0)) {
-        painter.arrow(from, to - from, line);
-    }
+    let sides = [(-0.5, 0.0), (0.5, 0.0), (-0.5, HEAD), (0.5, HEAD)];
+    let corners = sides.into_iter().flat_map(|(along, lift)| row(along, lift)).collect();
+    let fill = colour.gamma_multiply(0.2);
+    painter.add(Shape::convex_polygon(hull(corners), fill, line));
+    painter.add(Shape::line(row(0.0, 0.0), line));
     // The mark of the first scanline.
     if let Some(mark) = seen(probe.face(-0.5, 0.0).0) {
         painter.circle_filled(mark, 3.0, colour);
@@ -289,6 +311,18 @@ mod tests {
             // The damping takes a part of it.
             assert!((went - wanted).length() < 0.4 * wanted.length(), "{went:?} {wanted:?}");
         }
+    }
+
+    #[test]
+    fn a_hull_encloses_all_points_and_is_made_of_them() {
+        let corners = [pos2(0.0, 0.0), pos2(9.0, 1.0), pos2(10.0, 8.0), pos2(2.0, 7.0)];
+        let inside = [pos2(4.0, 3.0), pos2(5.0, 5.0), pos2(4.5, 0.5)];
+        let found = hull(corners.into_iter().chain(inside).collect());
+        assert_eq!(found.len(), 4, "{found:?}");
+        assert!(corners.iter().all(|corner| found.contains(corner)));
+        // Seen edge on, and as one point.
+        assert_eq!(hull(vec![pos2(0.0, 0.0), pos2(1.0, 1.0), pos2(2.0, 2.0)]).len(), 2);
+        assert!(hull(vec![pos2(3.0, 3.0)]).len() <= 1);
     }
 
     #[test]

@@ -134,6 +134,7 @@ pub(super) fn in_3d(
 ) {
     let Some(pictured) = pictured else { return };
     let painter = ui.painter_at(place.rect);
+    let place = place.of(pictured);
     let at = |point: DVec3| place.project(&pictured.look.camera, point);
     if let Some(target) = lesson.ghost(model) {
         let border = view3d::outline(&pictured.probe);

@@ -138,6 +138,20 @@ pub(super) struct Place {
 }
 
 impl Place {
+    /// The largest place within this one that has the shape of a picture, which was made for a panel that may have had
+    /// another.
+    pub(super) fn of(&self, pictured: &Pictured) -> Self {
+        let [width, height] = pictured.look.sight.size.map(|pixels| pixels as f32);
+        let scale = (self.rect.width() / width).min(self.rect.height() / height);
+        let size = vec2(width, height) * scale;
+        // A panel is whole points, its picture whole pixels: less than that is no other shape.
+        let same = (self.rect.size() - size).abs().max_elem() < 2.0;
+        match same {
+            true => *self,
+            false => Self { rect: Rect::from_center_size(self.rect.center(), size) },
+        }
+    }
+
     fn panel(&self) -> DVec2 {
         DVec2::new(self.rect.width().into(), self.rect.height().into())
     }
@@ -159,10 +173,9 @@ impl Place {
         let pixels = self.panel() * f64::from(scale);
         let detail = state.detail(pixels.x * pixels.y, Instant::now());
         let size = (pixels * detail).round().max(DVec2::ONE);
-        Look {
-            sight: model.view3d.sight([size.x as u32, size.y as u32]),
-            camera: model.view3d.camera,
-        }
+        let mut sight = model.view3d.sight([size.x as u32, size.y as u32]);
+        sight.cut = model.view3d.cuts(&model.pose);
+        Look { sight, camera: model.view3d.camera }
     }
 }
 
@@ -213,7 +226,7 @@ pub(super) fn show(
     state.watch(ui, model, before != model.view3d.camera);
     let painter = ui.painter_at(place.rect);
     if let Some(pictured) = pictured {
-        fan::show(&painter, &place, pictured, &model.view3d.wires);
+        fan::show(&painter, &place.of(pictured), pictured, &model.view3d.wires);
     } else {
         let (middle, font) = (place.rect.center(), FontId::proportional(14.0));
         let text = "Preparing the 3D view";
@@ -223,7 +236,10 @@ pub(super) fn show(
     painter.vline(place.rect.left(), place.rect.y_range(), edge);
     let below = place.rect.left_bottom() + vec2(10.0, -8.0);
     let hint = match model.hold.is_some() {
-        true => "skin: drag slides, Shift leans, Ctrl+wheel rotates; right drag: turn",
+        _ if model.view3d.cut && !model.view3d.cuts(&model.pose) => {
+            "looked at along the image plane nothing can be cut: drag to turn"
+        }
+        true => "skin: press and drag slides, Shift leans, Ctrl+wheel rotates; right drag: turn",
         false => "drag: turn    Shift+drag: move    wheel: nearer, farther",
     };
     let font = FontId::proportional(10.0);

@@ -64,11 +64,11 @@ based_on = "kidney"
 echogenicity = "-12 dB"
 "#;
 
-/// The entry that names the mesh which the probe has to touch.
+/// The entry that names the meshes which the probe has to touch: not the navel, whose rim yields to it.
 const CONTACT: &str = r#"# Joined over a gap that gel alone would not fill: real skin yields and lies around the curved face,
 # which this one, being rigid, cannot.
 [contact]
-mesh = ["skin", "body", "navel"]
+mesh = ["skin", "body"]
 gel = "9 mm"
 
 "#;

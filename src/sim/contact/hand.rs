@@ -127,16 +127,20 @@ impl<'s> Hand<'s> {
         };
         let turned = (turn * DQuat::from_mat3(&pose.matrix3)).normalize();
         let at = |point| DAffine3::from_mat3_translation(DMat3::from_quat(turned), point);
-        let placed = at(to.point);
+        let lift = press - self.pressed(&at(to.point), to).unwrap_or(0.0);
+        at(to.point - to.normal * lift)
+    }
+
+    /// Depth to which a face at `pose`, held to `spot`, is pressed in at its deepest point, mm; below 0 it is held above
+    /// the skin. None where there is no skin before it.
+    pub fn pressed(&self, pose: &DAffine3, spot: &Spot) -> Option<f64> {
         let places = (0..FACE[0]).flat_map(|i| (0..FACE[1]).map(move |j| [i, j]));
         let gaps = places.filter_map(|[i, j]| {
             let share = |i: u32, count: u32| f64::from(i) / f64::from(count - 1) - 0.5;
             let (point, _) = self.probe.face(share(i, FACE[0]), share(j, FACE[1]));
-            self.skin.gap(placed.transform_point3(point), -to.normal)
+            self.skin.gap(pose.transform_point3(point), -spot.normal)
         });
-        let least = gaps.fold(f64::INFINITY, f64::min);
-        let lift = if least.is_finite() { least + press } else { press };
-        at(to.point - to.normal * lift)
+        gaps.map(|gap| -gap).max_by(f64::total_cmp)
     }
 
     /// Radius of a disc of the face's area, mm: the skin's normal is averaged over it.

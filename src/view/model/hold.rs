@@ -12,7 +12,7 @@ use crate::sim::contact::{Body, Hand, PRESS, Skin, Spot};
 /// Least and greatest depth to which the probe is pressed in, mm; below 0 it is held above the skin.
 pub const PRESSES: [f64; 2] = [-10.0, 20.0];
 /// Sine of the angle to a plane below which a ray counts as looking along it.
-const EDGE_ON: f64 = 0.1;
+pub(super) const EDGE_ON: f64 = 0.1;
 /// Farthest that one movement takes the probe in its image plane, mm.
 const FARTHEST: f64 = 25.0;
 
@@ -28,9 +28,9 @@ pub struct Hold {
 }
 
 impl Hold {
-    /// A probe free to leave the skin; none where the scene names no skin.
+    /// A probe that stays on the skin, as a hand holds it; none where the scene names no skin.
     pub fn of(scene: &Scene) -> Option<Self> {
-        Some(Self { body: Body::of(scene)?, stays: false, press: PRESS, spot: None })
+        Some(Self { body: Body::of(scene)?, stays: true, press: PRESS, spot: None })
     }
 
     /// Moves the skin to the model's place: world from model.
@@ -46,6 +46,11 @@ impl Hold {
         known.map_or_else(|| hand.held(pose), |(_, spot)| spot)
     }
 
+    /// Depth to which the pointer presses it in: as it is, or gently where it is held above the skin.
+    fn put_on(&self) -> f64 {
+        if self.press < 0.0 { PRESS } else { self.press }
+    }
+
     fn put(&mut self, hand: &Hand<'_>, pose: &DAffine3, from: &Spot, to: Spot) -> DAffine3 {
         let put = hand.slid(pose, from, &to, self.press);
         self.spot = Some((put.translation, to));
@@ -53,21 +58,27 @@ impl Hold {
     }
 
     /// The pose after a movement that does not leave the skin: shifts go along it, pressing and lifting change
-    /// the depth, turns are those of the hand.
+    /// the depth, turns are those of the hand. None for a probe that is not near the skin.
     fn moved(
         &mut self,
         (skin, probe): (&Skin, &Probe),
         pose: &DAffine3,
         axis: Axis,
         amount: f64,
-    ) -> DAffine3 {
+    ) -> Option<DAffine3> {
         let hand = Hand::new(skin, probe);
         let from = self.spot(&hand, pose);
+        // Put here by something else, it is pressed as that has pressed it; out of a hand's reach it is free.
+        if self.spot.is_none_or(|(centre, _)| centre != pose.translation) {
+            let [least, most] = PRESSES;
+            let within = |press: &f64| (least..=most).contains(press);
+            self.press = hand.pressed(pose, &from).filter(within)?;
+        }
         let along = |axis: DVec3| {
             let tangent = pose.transform_vector3(axis).reject_from(from.normal);
             hand.beside(&from, tangent.normalize_or_zero() * amount)
         };
-        match axis {
+        Some(match axis {
             Axis::Lateral | Axis::Elevation => {
                 let axis = match axis {
                     Axis::Lateral => DVec3::X,
@@ -85,7 +96,7 @@ impl Hold {
                 let turned = moved(pose, axis, amount);
                 self.put(&hand, &turned, &from, from)
             }
-        }
+        })
     }
 }
 
@@ -137,13 +148,14 @@ impl Model {
         let (skin, _) = self.skin(now)?;
         let hold = self.hold.as_ref()?;
         let hand = Hand::new(&skin, &self.settings.probe);
-        Some(hand.slid(&pose, &hold.spot(&hand, &pose), to, hold.press))
+        Some(hand.slid(&pose, &hold.spot(&hand, &pose), to, hold.put_on()))
     }
 
     /// Slides the probe to a place of the skin.
     pub fn slide_to(&mut self, to: &Spot, now: Instant) {
         self.slide(now, |hand, hold, pose| {
             let from = hold.spot(hand, pose);
+            hold.press = hold.put_on();
             Some(hold.put(hand, pose, &from, *to))
         });
     }
@@ -166,7 +178,7 @@ impl Model {
         self.move_by(Source::Pointer, Axis::Tilt, tilt, now);
     }
 
-    /// Sets whether every movement keeps the probe on the skin; if so, puts it there.
+    /// Sets whether every movement keeps the probe on the skin; if so, puts it there, pressed in gently.
     pub fn stay_on_skin(&mut self, stays: bool, now: Instant) {
         if let Some(hold) = &mut self.hold {
             hold.stays = stays;
@@ -174,6 +186,7 @@ impl Model {
         if stays {
             self.slide(now, |hand, hold, pose| {
                 let from = hold.spot(hand, pose);
+                hold.press = PRESS;
                 Some(hold.put(hand, pose, &from, from))
             });
         }
@@ -188,7 +201,7 @@ impl Model {
     ) -> Option<DAffine3> {
         let (pose, probe) = (self.pose, self.settings.probe.clone());
         let (skin, hold) = self.skin(now).filter(|(_, hold)| hold.stays)?;
-        Some(hold.moved((&skin, &probe), &pose, axis, amount))
+        hold.moved((&skin, &probe), &pose, axis, amount)
     }
 
     fn slide(
@@ -259,6 +272,16 @@ mod tests {
     fn a_probe_that_stays_goes_along_the_skin_and_a_free_one_straight() {
         let now = Instant::now();
         let (_, mut model) = ball(CONTACT);
+        // The scene has it pressed in by 0.5 mm, and so it stays.
+        model.move_probe(Axis::Lateral, 10.0, now);
+        assert!((height(&model.pose) + 0.5).abs() < 0.01);
+        // Far from the skin it is free.
+        let far = DAffine3::from_translation(DVec3::new(0.0, 0.0, -50.0));
+        model.place_probe(Source::Keyboard, far, now);
+        model.move_probe(Axis::Lateral, 10.0, now);
+        assert!(model.pose.translation.distance(DVec3::new(10.0, 0.0, -50.0)) < 1e-9);
+        model.place_probe(Source::Keyboard, model.home, now);
+        model.stay_on_skin(false, now);
         model.move_probe(Axis::Lateral, 10.0, now);
         assert!(model.pose.translation.distance(DVec3::new(10.0, 0.0, 0.5)) < 1e-9);
         model.place_probe(Source::Keyboard, model.home, now);

@@ -3,6 +3,7 @@
 use glam::{DAffine3, DVec2, DVec3};
 
 use super::camera::Camera;
+use super::hold::EDGE_ON;
 use crate::probe::{Kind, Probe};
 use crate::scene::palette::{self, Show};
 use crate::scene::{Orientation, Scene};
@@ -108,6 +109,13 @@ impl View3d {
     /// Moves the camera back to the view of probe and fan from the side.
     pub fn reset(&mut self, pose: &DAffine3, probe: &Probe) {
         self.camera = overview(pose, probe);
+    }
+
+    /// Returns whether the side towards the camera is cut away for a probe at `pose` (world from probe): where the camera
+    /// looks along the image plane there is no such side, and everything is shown.
+    pub fn cuts(&self, pose: &DAffine3) -> bool {
+        let normal = pose.transform_vector3(DVec3::Y).normalize();
+        self.cut && normal.dot(self.camera.forward()).abs() > EDGE_ON
     }
 
     /// The simulation's input for the picture: `size` in pixels.
