@@ -112,6 +112,25 @@ fn the_fetus_is_measured_as_large_as_it_was_made() {
         named(Kind::Ellipse, vec![front[0], front[1], sides[0]], "HC"),
     ];
     let trunk = placed(&scene, "trunk");
+    // Across the trunk at the navel.
+    let navel = scene.instances.iter().find(|i| i.name == "trunk").expect("there is one");
+    let navel = navel.world_from_object.transform_point3(DVec3::new(-8.0, 0.0, -0.6));
+    let around = cut(&trunk, &plane(navel - 40.0 * back, left, back));
+    let around = outline(&around, DVec2::new(0.0, 40.0), 0.0, 240);
+    let [right, behind, front] = [0, 60, 180].map(|i| around[i]);
+    all.push(named(Kind::Ellipse, vec![front, behind, right], "AC"));
+    let femur = placed(&scene, "left-femur");
+    let ends = femur.iter().flatten();
+    let pairs = ends.clone().flat_map(|a| ends.clone().map(move |b| [*a, *b]));
+    let far = |[a, b]: &[DVec3; 2]| a.distance(*b);
+    let [knee, hip] = pairs.max_by(|a, b| far(a).total_cmp(&far(b))).expect("a femur");
+    let across = (hip - knee).any_orthonormal_vector();
+    let along = plane(knee - 30.0 * across, hip - knee, across);
+    let flat = |point: DVec3| {
+        let point = along.inverse().transform_point3(point);
+        DVec2::new(point.x, point.z)
+    };
+    all.push(named(Kind::Distance, vec![flat(knee), flat(hip)], "FL"));
     let rump = trunk.iter().flatten().min_by(|a, b| a.dot(crown).total_cmp(&b.dot(crown)));
     let top = placed(&scene, "head");
     let top = top.iter().flatten().max_by(|a, b| a.dot(crown).total_cmp(&b.dot(crown)));
@@ -125,9 +144,14 @@ fn the_fetus_is_measured_as_large_as_it_was_made() {
     all.push(named(Kind::Distance, vec![seen(top), seen(rump)], "CRL"));
     let sheet = Worksheet::of(Exam::Obstetric, &all);
     let (bpd, ofd) = (17.0, 21.5);
-    for (name, expected) in
-        [("BPD", bpd), ("OFD", ofd), ("HC", TAU * (bpd + ofd) / 4.0), ("CRL", 43.0)]
-    {
+    for (name, expected) in [
+        ("BPD", bpd),
+        ("OFD", ofd),
+        ("HC", TAU * (bpd + ofd) / 4.0),
+        ("AC", TAU * (7.9 + 1.5 / 4.0)),
+        ("FL", 7.2),
+        ("CRL", 43.0),
+    ] {
         close(name, sheet.mean(name).expect("measured"), expected, 0.03);
     }
     // Eleven weeks, as the model's author meant: 77.5 days.

@@ -30,8 +30,10 @@ const SKULL: Vec3 = Vec3::new(9.4, 8.5, 10.75);
 const VAULT: f32 = 0.7;
 /// See [`VAULT`].
 const SCALP: f32 = 1.1;
-/// Radius of the trunk at the navel.
+/// Radius of the trunk's cones at the navel, where two of them meet.
 const BELLY: f32 = 7.9;
+/// Width of the fillets of the trunk. Where two cones meet it adds a quarter of itself to the radius.
+const FILLET: f32 = 1.5;
 
 /// Returns the sizes of the fetus as text, for the scene file.
 pub fn biometry() -> String {
@@ -44,7 +46,7 @@ pub fn biometry() -> String {
         (days / 7.0).floor(),
         days % 7.0,
         PI * (bpd + ofd) / 2.0,
-        2.0 * PI * BELLY,
+        2.0 * PI * (BELLY + FILLET / 4.0),
         LEG.upper.distance(Vec3::ZERO) - BONE_GAP,
         ARM.upper.distance(Vec3::ZERO) - BONE_GAP,
     )
@@ -106,7 +108,7 @@ fn trunk(p: &Point) -> Tree {
             cone(p, point(-8.0, 0.0, -0.6), BELLY, point(-14.5, 0.0, -0.9), 6.4),
             cone(p, point(-14.5, 0.0, -0.9), 6.4, point(-16.0, 0.0, 0.0), 5.5),
         ],
-        1.5,
+        FILLET,
     ) + undulation(p, 0.15, 9.0, 1.0)
 }
 
