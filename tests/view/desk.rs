@@ -450,9 +450,18 @@ impl Desk {
 
     /// Most memory that the program has held so far, bytes.
     pub fn memory(&self) -> u64 {
+        self.status("VmHWM:")
+    }
+
+    /// Memory that the program holds now, bytes.
+    pub fn memory_now(&self) -> u64 {
+        self.status("VmRSS:")
+    }
+
+    fn status(&self, row: &str) -> u64 {
         let path = format!("/proc/{}/status", self.program.id());
         let text = std::fs::read_to_string(path).expect("the program runs");
-        let line = text.lines().find_map(|l| l.strip_prefix("VmHWM:"));
+        let line = text.lines().find_map(|l| l.strip_prefix(row));
         let value = line.and_then(|l| l.split_whitespace().next()?.parse::<u64>().ok());
         1024 * value.expect("a size")
     }

@@ -18,6 +18,7 @@ mod planes;
 mod robust;
 #[path = "../common/skip.rs"]
 mod skip;
+mod soak;
 mod tools;
 mod tracker;
 mod trajectory;
