@@ -118,6 +118,7 @@ impl Open {
         self.state.tools.lose();
         self.state.mmode = Default::default();
         self.state.poses = Default::default();
+        self.state.lesson.leave();
         self.state.planes = Default::default();
         self.state.files.opening = false;
         self.state.files.close();
