@@ -226,16 +226,16 @@ mod tests {
 
     #[test]
     fn a_kept_way_is_thinned_and_has_both_ends() {
-        // Steps of 0.1 mm and no movement at all.
+        // Each place twice: steps, and no movement at all.
         let along = |steps: i32, step: f64| {
             let poses = (0..=steps).flat_map(|i| {
                 [DAffine3::from_translation(DVec3::new(step * f64::from(i), 0.0, -7.04)); 2]
             });
             Path { poses: poses.collect(), ..Path::default() }.way()
         };
-        let near = along(48, 0.1);
-        assert!((9..=10).contains(&near.len()), "{near:?}");
-        assert_eq!([near[0], near[near.len() - 1]], [[0.0, 0.0, -7.0], [4.8, 0.0, -7.0]]);
+        // Every half millimetre up to 4.5 mm, and the end at 4.875 mm.
+        let near = along(39, 0.125);
+        assert_eq!((near.len(), near[1], near[10]), (11, [0.5, 0.0, -7.0], [4.9, 0.0, -7.0]));
         let far = along(100_000, 1.0);
         assert!((200..=257).contains(&far.len()), "{}", far.len());
         assert_eq!(far[far.len() - 1], [1e5, 0.0, -7.0]);
