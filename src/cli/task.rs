@@ -81,13 +81,14 @@ pub fn run(args: &Arguments) -> Result<()> {
     let mut scores = Vec::new();
     for (path, way) in attempts {
         let seen = seen_at_end(args, &scene, task, &way)?;
+        let kept = way.way();
         let attempt = Attempt { path: way, seen, measured: args.measured, answer, guided: false };
         let score = scored(&scene, task, &attempt);
         if !args.json {
             print(path.map(PathBuf::as_path), task, &score);
         }
         if let (Some(folder), Some(learner)) = (&args.history, &args.learner) {
-            history::add(folder, &Entry::now(learner, &scene.name, score.clone()))?;
+            history::add(folder, &Entry::now(learner, &scene.name, score.clone(), kept))?;
         }
         let mut json = serde_json::to_value(&score).into_diagnostic()?;
         json["trajectory"] = path.map(|path| path.display().to_string()).into();

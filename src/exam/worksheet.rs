@@ -77,8 +77,10 @@ impl Line {
 pub struct Derived {
     /// Its name.
     pub name: &'static str,
-    /// The value, in the unit that `text` has.
+    /// The value.
     pub value: f64,
+    /// Its unit; an age is in weeks.
+    pub unit: &'static str,
     /// The value as it is said.
     pub text: String,
     /// Where the formula is from.
@@ -154,16 +156,22 @@ impl Worksheet {
         self.derived.iter().find(|one| one.name == name).map(|one| one.value)
     }
 
-    fn add(&mut self, name: &'static str, value: f64, unit: &str, source: &'static str) {
+    fn add(&mut self, name: &'static str, value: f64, unit: &'static str, source: &'static str) {
         let text = match unit {
             "g" => format!("{value:.0} {unit}"),
             _ => format!("{value:.1} {unit}"),
         };
-        self.derived.push(Derived { name, value, text, source });
+        self.derived.push(Derived { name, value, unit, text, source });
     }
 
     fn age(&mut self, name: &'static str, weeks: f64, source: &'static str) {
-        self.derived.push(Derived { name, value: weeks, text: spoken(weeks), source });
+        self.derived.push(Derived {
+            name,
+            value: weeks,
+            unit: "weeks",
+            text: spoken(weeks),
+            source,
+        });
     }
 
     fn pregnancy(&mut self) {

@@ -1,17 +1,18 @@
 //! What learners have done: a table (CSV) and the same as JSON, one pair of files per learner. Both are written whole
 //! or not at all, one writer after the other, so that neither a crash nor two windows at once lose an entry.
 
+use std::cmp::Ordering;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde::{Deserialize, Serialize};
 
-use super::Score;
+use super::{Movement, Score};
 use crate::issue::{self, FileError};
 use crate::output::files;
 
-/// Largest history, bytes; an attempt takes about 600.
+/// Largest history, bytes; an attempt takes about 600, and its way up to 7000.
 const MOST: u64 = 64 << 20;
 /// Longest name of a learner, characters.
 const LONGEST: usize = 80;
@@ -28,14 +29,18 @@ pub struct Entry {
     /// The score.
     #[serde(flatten)]
     pub score: Score,
+    /// The way of the middle of the probe's face, mm, thinned; empty where none was recorded, and in older histories.
+    #[serde(default)]
+    pub way: Vec<[f64; 3]>,
 }
 
 impl Entry {
-    /// An attempt that is over now.
-    pub fn now(learner: &str, scene: &str, score: Score) -> Self {
+    /// An attempt that is over now, with its way ([`super::Path::way`]).
+    pub fn now(learner: &str, scene: &str, score: Score, way: Vec<[f64; 3]>) -> Self {
         let since = SystemTime::now().duration_since(UNIX_EPOCH);
         let unix_seconds = since.map_or(0, |since| since.as_secs());
-        Self { learner: learner.trim().to_owned(), unix_seconds, scene: scene.to_owned(), score }
+        let (learner, scene) = (learner.trim().to_owned(), scene.to_owned());
+        Self { learner, unix_seconds, scene, score, way }
     }
 }
 
@@ -97,12 +102,29 @@ pub fn add(folder: &Path, entry: &Entry) -> Result<(), FileError> {
     let held = held.and_then(|held| held.lock().map(|()| held)).map_err(|e| failed(&lock, e))?;
     let mut all = read(folder, &entry.learner)?;
     all.push(entry.clone());
-    let json = serde_json::to_string_pretty(&all).expect("plain data") + "\n";
+    // A line each.
+    let lines: Vec<_> =
+        all.iter().map(|one| serde_json::to_string(one).expect("plain data")).collect();
+    let json = format!("[\n{}\n]\n", lines.join(",\n"));
     files::replace(&path, json.as_bytes()).map_err(|e| failed(&path, e))?;
     let path = path.with_extension("csv");
     files::replace(&path, table(&all).as_bytes()).map_err(|e| failed(&path, e))?;
     drop(held);
     Ok(())
+}
+
+/// The best of some attempts at one task, of those that reached it: one without the guide, with the least error, the
+/// shortest path, in the least time.
+pub fn best<'e>(attempts: impl Iterator<Item = &'e Entry>) -> Option<&'e Entry> {
+    let amounts = |score: &Score| {
+        let Movement { seconds, path_mm, .. } = score.movement;
+        [score.error_percent.map_or(0.0, f64::abs), path_mm, seconds]
+    };
+    attempts.filter(|entry| entry.score.reached).min_by(|a, b| {
+        let (a, b) = (&a.score, &b.score);
+        let by_amounts = || amounts(a).partial_cmp(&amounts(b)).unwrap_or(Ordering::Equal);
+        a.guided.cmp(&b.guided).then_with(by_amounts)
+    })
 }
 
 /// The attempts as a table: a line each; empty cells are quantities that a task does not ask for.
@@ -111,7 +133,7 @@ pub fn table(entries: &[Entry]) -> String {
                    plane_angle_deg,turn_deg,held_s,seen_mm2,measured,true_value,error_percent,answer,reasons\n"
         .to_owned();
     let number = |value: Option<f64>| value.map_or_else(String::new, |value| value.to_string());
-    for Entry { learner, unix_seconds, scene, score } in entries {
+    for Entry { learner, unix_seconds, scene, score, .. } in entries {
         let movement = &score.movement;
         let seen: Vec<_> = score.seen.iter().map(|(name, area)| format!("{name} {area}")).collect();
         let cells = [
@@ -161,7 +183,7 @@ mod tests {
             reasons: vec!["a, \"b\"".to_owned()],
             ..Score::default()
         };
-        Entry::now(learner, "scene", score)
+        Entry::now(learner, "scene", score, vec![[0.1, -20.0, 3.5], [1.0, 2.0, 3.0]])
     }
 
     #[test]
@@ -175,6 +197,13 @@ mod tests {
         }
         add(&at, &entry("Bo", "one")).unwrap();
         assert_eq!(read(&at, "Ann").unwrap(), all);
+        let json = std::fs::read_to_string(at.join("Ann.json")).unwrap();
+        assert_eq!(json.lines().count(), 4, "a line for each, between brackets");
+        // Histories of before ways were kept.
+        let older = json.replace(",\"way\":[[0.1,-20.0,3.5],[1.0,2.0,3.0]]", "");
+        std::fs::write(at.join("Old.json"), older).unwrap();
+        let read_again = read(&at, "Old").unwrap();
+        assert_eq!(read_again[1], Entry { way: Vec::new(), ..all[1].clone() });
         let csv = std::fs::read_to_string(at.join("Ann.csv")).unwrap();
         assert_eq!(csv.lines().count(), 3);
         assert!(csv.contains("\"a, \"\"b\"\"\"") && csv.contains(",1.5,"), "{csv}");
@@ -189,6 +218,26 @@ mod tests {
         for name in ["", "  ", "a/b", "..", &"x".repeat(81)] {
             assert!(file(&at, name).is_err(), "{name}");
         }
+    }
+
+    #[test]
+    fn the_best_has_reached_its_task_alone_and_by_the_shortest_way() {
+        let tried = |reached, guided, path_mm, error_percent| {
+            let movement = Movement { path_mm, ..Movement::default() };
+            let score = Score { reached, guided, movement, error_percent, ..Score::default() };
+            Entry { score, ..entry("Ann", "t") }
+        };
+        let all = [
+            tried(false, false, 1.0, None),
+            tried(true, true, 20.0, None),
+            tried(true, false, 90.0, None),
+            tried(true, false, 60.0, None),
+        ];
+        assert_eq!(best(all.iter()), Some(&all[3]));
+        assert_eq!(best(all[..2].iter()), Some(&all[1]));
+        assert_eq!(best(all[..1].iter()), None);
+        let measured = [tried(true, false, 5.0, Some(4.0)), tried(true, false, 9.0, Some(-2.0))];
+        assert_eq!(best(measured.iter()), Some(&measured[1]));
     }
 
     #[test]

@@ -15,6 +15,10 @@ const SMOOTH: f64 = 0.06;
 const REST: f64 = 5.0;
 /// Most steps: longer trajectories are looked at in longer steps.
 const STEPS: usize = 1_000_000;
+/// Least distance between the points of a thinned way, mm.
+const APART: f64 = 0.5;
+/// Most points of a thinned way; one more may be its end.
+const MOST: usize = 256;
 
 /// The poses of the probe at times that increase; straight lines and great circles lie between them.
 #[derive(Clone, Debug, Default)]
@@ -70,6 +74,27 @@ impl Path {
         let [a, b] = [from, to].map(|pose| DQuat::from_mat3(&pose.matrix3).normalize());
         let place = from.translation.lerp(to.translation, share);
         DAffine3::from_rotation_translation(a.slerp(b, share), place)
+    }
+
+    /// The way of the face's middle, mm to a tenth, thinned for a history: what lies nearer than half a millimetre to
+    /// the point before is left out, and of a way that is longer still, all but about 256 points.
+    pub fn way(&self) -> Vec<[f64; 3]> {
+        let mut points: Vec<DVec3> = Vec::new();
+        for place in self.poses.iter().map(|pose| pose.translation) {
+            if points.last().is_none_or(|last| last.distance(place) >= APART) {
+                points.push(place);
+            }
+        }
+        let each = points.len().div_ceil(MOST).max(1);
+        let thinned = points.into_iter().step_by(each);
+        let rounded = |point: DVec3| point.to_array().map(|mm| (10.0 * mm).round() / 10.0);
+        let mut way: Vec<[f64; 3]> = thinned.map(rounded).collect();
+        if let Some(end) = self.last().map(|pose| rounded(pose.translation))
+            && way.last() != Some(&end)
+        {
+            way.push(end);
+        }
+        way
     }
 
     /// How the probe was moved.
@@ -197,6 +222,24 @@ mod tests {
             assert_eq!(found.peaks, 6, "{rate}");
             assert!((found.path_mm - 240.0).abs() < 0.5, "{found:?}");
         }
+    }
+
+    #[test]
+    fn a_kept_way_is_thinned_and_has_both_ends() {
+        // Each place twice: steps, and no movement at all.
+        let along = |steps: i32, step: f64| {
+            let poses = (0..=steps).flat_map(|i| {
+                [DAffine3::from_translation(DVec3::new(step * f64::from(i), 0.0, -7.04)); 2]
+            });
+            Path { poses: poses.collect(), ..Path::default() }.way()
+        };
+        // Every half millimetre up to 4.5 mm, and the end at 4.875 mm.
+        let near = along(39, 0.125);
+        assert_eq!((near.len(), near[1], near[10]), (11, [0.5, 0.0, -7.0], [4.9, 0.0, -7.0]));
+        let far = along(100_000, 1.0);
+        assert!((200..=257).contains(&far.len()), "{}", far.len());
+        assert_eq!(far[far.len() - 1], [1e5, 0.0, -7.0]);
+        assert_eq!(Path::default().way(), Vec::<[f64; 3]>::new());
     }
 
     #[test]

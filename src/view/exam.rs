@@ -28,7 +28,7 @@ pub(super) struct Examination {
 /// The worksheet of all measurements, on the image and off it; its sources are places in [`Marks::iter`].
 ///
 /// [`Marks::iter`]: super::model::sheet::Marks::iter
-fn worksheet(model: &Model) -> Worksheet {
+pub(super) fn worksheet(model: &Model) -> Worksheet {
     let measured = model.sheet.all().iter().map(|mark| match &mark.what {
         What::Caliper(caliper) => caliper.measured(),
         What::Note(_) => Measured::default(),

@@ -1,26 +1,30 @@
 //! The lesson: tasks of the scene, a guide on the way, the score at the end, and the history of the learner.
 
+mod history;
 mod marking;
+mod measured;
 
-use std::path::PathBuf;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
-use egui::{Color32, Context, RichText, Shape, Stroke, TextEdit, Ui};
+use egui::{Align2, Color32, Context, RichText, Shape, Stroke, TextEdit, Ui, vec2};
 use glam::{DAffine3, DVec3};
 
+use self::history::{Page, folder};
 use self::marking::{Marking, Order, marked};
+use self::measured::Measured;
 use super::look::Pictured;
 use super::model::trajectory::Recorder;
 use super::model::{Model, Source};
 use super::style::{self, button};
 use super::view3d;
 use crate::scene::task::{Goal, Task};
-use crate::settings::Words as _;
-use crate::teach::history;
+use crate::teach::history::Entry;
 use crate::teach::{Score, guide};
 
 /// Width of the panel, points.
 const WIDTH: f32 = 300.0;
+/// Time between two questions whether a score is there.
+const ASK: Duration = Duration::from_millis(50);
 /// Colour of the target, and of the way that was gone.
 const GHOST: Color32 = Color32::from_rgb(120, 210, 120);
 
@@ -41,11 +45,13 @@ pub(super) struct Lesson {
     run: Option<Run>,
     /// The attempt that is being scored.
     marking: Option<Marking>,
-    /// The last score, and the way that was gone.
-    result: Option<(Score, Vec<DVec3>)>,
+    /// The last attempt.
+    result: Option<Entry>,
+    /// The learner's history, while it is shown.
+    page: Option<Page>,
     problem: Option<String>,
     learner: String,
-    measured: String,
+    measured: Measured,
     answer: Option<usize>,
 }
 
@@ -65,16 +71,26 @@ impl Lesson {
         }
     }
 
-    /// The way of the last attempt, to be shown in 3D; the middle of the probe's face.
-    fn way(&self) -> &[DVec3] {
-        match &self.result {
-            Some((_, way)) if self.open => way,
-            _ => &[],
-        }
+    /// The way that is shown in 3D, of the middle of the probe's face: of the attempt that is chosen in the history,
+    /// else of the last one.
+    fn way(&self, model: &Model) -> &[[f64; 3]] {
+        let attempt = match &self.page {
+            Some(page) => page.chosen(),
+            None => self.result.as_ref(),
+        };
+        let here = attempt.filter(|attempt| self.open && attempt.scene == model.title);
+        here.map_or(&[], |attempt| &attempt.way)
     }
 
     fn guides(&self) -> bool {
         self.open && self.run.is_some() && self.guide && !self.examiner
+    }
+
+    /// Ends what belongs to a scene: another one has been opened.
+    pub(super) fn leave(&mut self) {
+        let Self { open, examiner, guide, .. } = *self;
+        let learner = std::mem::take(&mut self.learner);
+        *self = Self { open, examiner, guide, learner, ..Self::default() };
     }
 }
 
@@ -83,33 +99,51 @@ pub(super) fn show(ctx: &Context, model: &mut Model, lesson: &mut Lesson, now: I
     let guides = lesson.guides();
     if let Some(run) = &mut lesson.run {
         run.recorder.note("lesson", model.pose, now);
+        // Also where a key has switched it on.
+        if lesson.examiner && model.layer.shown {
+            model.layer.shown = false;
+            model.touch(now);
+        }
         run.guided |= guides || model.layer.shown;
     }
-    if let Some(marking) = &lesson.marking
-        && let Some(found) = marking.done()
-    {
-        lesson.marking = None;
-        match found {
-            Ok(result) => lesson.result = Some(result),
-            Err(problem) => lesson.problem = Some(problem),
+    if let Some(marking) = &lesson.marking {
+        match marking.done() {
+            // The thread that scores cannot wake the window.
+            None => ctx.request_repaint_after(ASK),
+            Some(found) => {
+                lesson.marking = None;
+                match found {
+                    Ok((attempt, problem)) => {
+                        (lesson.result, lesson.problem) = (Some(attempt), problem);
+                    }
+                    Err(problem) => lesson.problem = Some(problem),
+                }
+                // The 3D view, with the way, has been drawn before.
+                ctx.request_repaint();
+            }
         }
     }
     if !lesson.open {
         return;
     }
     let mut open = true;
-    let window = egui::Window::new("Lesson")
-        .open(&mut open)
-        .resizable(false)
-        // Beside the tools, below most images.
-        .default_pos([56.0, 420.0]);
-    window.default_pos([12.0, 44.0]).show(ctx, |ui| {
-        ui.set_width(WIDTH);
+    // At first beside the tools and above the bar: it grows upwards from there, off the results at the upper left.
+    let corner = ctx.content_rect().left_bottom() + vec2(46.0, -44.0);
+    let window = egui::Window::new("Lesson").open(&mut open).auto_sized();
+    window.pivot(Align2::LEFT_BOTTOM).default_pos(corner).show(ctx, |ui| {
+        ui.set_width(if lesson.page.is_some() { history::WIDTH } else { WIDTH });
         if model.tasks.is_empty() {
             ui.label("This scene sets no tasks. They stand in its file, as [[task]].");
             return;
         }
         lesson.chosen = lesson.chosen.min(model.tasks.len() - 1);
+        if let Some(page) = &mut lesson.page {
+            let of = (model.title.as_str(), model.tasks[lesson.chosen].name.as_str());
+            if !history::show(ui, page, of) {
+                lesson.page = None;
+            }
+            return;
+        }
         match lesson.run.is_some() {
             false => before(ui, model, lesson, now),
             true => during(ui, model, lesson, now),
@@ -124,7 +158,7 @@ pub(super) fn show(ctx: &Context, model: &mut Model, lesson: &mut Lesson, now: I
     lesson.open = open;
 }
 
-/// Draws the target and the way of the last attempt over the 3D view, by the picture's own camera.
+/// Draws the target and the way of an attempt over the 3D view, by the picture's own camera.
 pub(super) fn in_3d(
     ui: &Ui,
     place: &view3d::Place,
@@ -149,9 +183,12 @@ pub(super) fn in_3d(
             painter.circle_filled(mark, 4.0, GHOST);
         }
     }
-    let way: Option<Vec<_>> = lesson.way().iter().map(|&point| at(point)).collect();
-    if let Some(way) = way {
+    let way: Option<Vec<_>> = lesson.way(model).iter().map(|&point| at(point.into())).collect();
+    if let Some(way) = way
+        && let Some(&end) = way.last()
+    {
         painter.add(Shape::line(way, Stroke::new(2.0, GHOST)));
+        painter.circle_filled(end, 4.0, GHOST);
     }
 }
 
@@ -172,26 +209,39 @@ fn before(ui: &mut Ui, model: &mut Model, lesson: &mut Lesson, now: Instant) {
         ui.add(field.hint_text("name, for the history"))
             .on_hover_text(folder().map_or_else(String::new, |at| at.display().to_string()));
     });
-    let idle = lesson.marking.is_none();
-    if idle && button(ui, "Start", "The time begins, and the probe's way is recorded") {
-        start(model, lesson, now);
+    if lesson.marking.is_none() {
+        ui.horizontal(|ui| {
+            if button(ui, "Start", "The time begins, and the probe's way is recorded") {
+                start(model, lesson, now);
+            }
+            let learner = lesson.learner.trim();
+            let tip = "This learner's attempts: scores, and their ways in the 3D view";
+            if !learner.is_empty() && button(ui, "History", tip) {
+                lesson.page = Some(Page::of(learner));
+            }
+        });
     }
-    if let Some((score, _)) = &lesson.result {
+    if let Some(attempt) = &lesson.result {
         ui.separator();
-        let (word, colour) = match score.reached {
-            true => ("Reached", GHOST),
-            false => ("Not reached", style::WARN),
-        };
-        ui.label(RichText::new(word).color(colour).strong());
-        for reason in &score.reasons {
-            ui.label(reason);
-        }
-        for line in score.lines() {
-            ui.label(RichText::new(line).color(style::FAINT));
-        }
+        told(ui, &attempt.score);
         if let Goal::Question(question) = &model.tasks[lesson.chosen].goal {
             ui.label(&question.explanation);
         }
+    }
+}
+
+/// A score: whether the task is reached, why not, and the numbers.
+fn told(ui: &mut Ui, score: &Score) {
+    let (word, colour) = match score.reached {
+        true => ("Reached", GHOST),
+        false => ("Not reached", style::WARN),
+    };
+    ui.label(RichText::new(word).color(colour).strong());
+    for reason in &score.reasons {
+        ui.label(reason);
+    }
+    for line in score.lines() {
+        ui.label(RichText::new(line).color(style::FAINT));
     }
 }
 
@@ -199,14 +249,10 @@ fn start(model: &mut Model, lesson: &mut Lesson, now: Instant) {
     if let Some(pose) = model.tasks[lesson.chosen].start {
         model.place_probe(Source::Pointer, pose, now);
     }
-    if lesson.examiner && model.layer.shown {
-        model.layer.shown = false;
-        model.touch(now);
-    }
     let recorder = Recorder::new(model.pose, model.clock.at(now), now);
     lesson.run = Some(Run { recorder, guided: false });
     (lesson.result, lesson.problem, lesson.answer, lesson.hints) = (None, None, None, 0);
-    lesson.measured.clear();
+    lesson.measured = Measured::default();
 }
 
 /// What is to be done, the guide, and the way to hand it in.
@@ -218,11 +264,9 @@ fn during(ui: &mut Ui, model: &mut Model, lesson: &mut Lesson, now: Instant) {
         guided(ui, model, lesson, &task, now);
     }
     match &task.goal {
-        Goal::Measure(measurement) => drop(ui.horizontal(|ui| {
-            ui.label("Measured");
-            ui.add(TextEdit::singleline(&mut lesson.measured).desired_width(80.0));
-            ui.label(measurement.unit.word());
-        })),
+        Goal::Measure(measurement) => {
+            measured::show(ui, model, &mut lesson.measured, measurement.unit);
+        }
         Goal::Question(question) => {
             for (index, choice) in question.choices.iter().enumerate() {
                 ui.radio_value(&mut lesson.answer, Some(index), choice);
@@ -230,7 +274,7 @@ fn during(ui: &mut Ui, model: &mut Model, lesson: &mut Lesson, now: Instant) {
         }
         Goal::View(_) | Goal::Show(_) => {}
     }
-    let measured = lesson.measured.trim().replace(',', ".").parse::<f64>().ok();
+    let measured = lesson.measured.value();
     let lacks = matches!(task.goal, Goal::Measure(_)) && measured.is_none();
     ui.horizontal(|ui| {
         let hand_in = egui::Button::new("Submit");
@@ -248,7 +292,7 @@ fn during(ui: &mut Ui, model: &mut Model, lesson: &mut Lesson, now: Instant) {
                 learner: lesson.learner.trim().to_owned(),
                 folder: folder(),
             };
-            match marked(order, ui.ctx().clone()) {
+            match marked(order) {
                 Ok(marking) => lesson.marking = Some(marking),
                 Err(problem) => lesson.problem = Some(problem.to_string()),
             }
@@ -286,16 +330,4 @@ fn guided(ui: &mut Ui, model: &mut Model, lesson: &mut Lesson, task: &Task, now:
             ui.label(format!("{} {}", step.arrow(), step.words()));
         }
     }
-}
-
-/// The folder of the learners' histories.
-fn folder() -> Option<PathBuf> {
-    dirs::data_local_dir().map(|data| data.join("insonify").join("learners"))
-}
-
-/// Notes an attempt in the learner's history.
-fn note(folder: Option<PathBuf>, entry: &history::Entry) -> Result<(), String> {
-    let folder =
-        folder.ok_or("there is no folder for a user's data, so that no history is kept")?;
-    history::add(&folder, entry).map_err(|e| format!("{e}; {}", e.remedy))
 }

@@ -11,6 +11,7 @@ mod contact;
 mod desk;
 mod exam;
 mod framing;
+mod lesson;
 mod live;
 mod mmode;
 mod panels;

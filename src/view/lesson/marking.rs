@@ -4,8 +4,9 @@ use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::thread;
 
-use glam::{DAffine3, DVec3};
+use glam::DAffine3;
 
+use super::history::note;
 use crate::gpu::{Device, DeviceOptions, cache_folder};
 use crate::scene::Scene;
 use crate::scene::animation::Track;
@@ -34,8 +35,8 @@ pub(super) struct Order {
     pub(super) folder: Option<PathBuf>,
 }
 
-/// The score, and the way of the face's middle; or what is wrong.
-type Found = Result<(Score, Vec<DVec3>), String>;
+/// The attempt with its score, and why it is not in the learner's history; or what is wrong.
+type Found = Result<(Entry, Option<String>), String>;
 
 /// A score that is being found.
 pub(super) struct Marking(Receiver<Found>);
@@ -51,13 +52,12 @@ impl Marking {
     }
 }
 
-/// Begins to score; the window is drawn again when the score is there.
-pub(super) fn marked(order: Order, window: egui::Context) -> std::io::Result<Marking> {
+/// Begins to score.
+pub(super) fn marked(order: Order) -> std::io::Result<Marking> {
     let (give, take) = channel();
     thread::Builder::new().name("marking".to_owned()).spawn(move || {
         // A window that is gone needs no score.
         let _ = give.send(mark(order));
-        window.request_repaint();
     })?;
     Ok(Marking(take))
 }
@@ -68,7 +68,7 @@ fn mark(order: Order) -> Found {
     let found = scene.tasks.iter().find(|task| task.name == order.task);
     let task = found.cloned().ok_or("the scene file no longer has this task")?;
     let path = Path::of(&order.track, &scene.world_from_probe);
-    let way = path.poses.iter().map(|pose| pose.translation).collect();
+    let way = path.way();
     let seen = match (&task.goal, path.last()) {
         (Goal::Show(cover), Some(last)) => {
             scene.world_from_probe = last;
@@ -85,11 +85,12 @@ fn mark(order: Order) -> Found {
     let touch: Option<&mut Touch<'_>> =
         if scene.contact.is_some() { Some(&mut touch) } else { None };
     let score = Score::of(&scene, &task, &attempt, touch);
-    if !order.learner.is_empty() {
-        let entry = Entry::now(&order.learner, &scene.name, score.clone());
-        super::note(order.folder, &entry)?;
-    }
-    Ok((score, way))
+    let entry = Entry::now(&order.learner, &scene.name, score, way);
+    let noted = match order.learner.is_empty() {
+        true => Ok(()),
+        false => note(order.folder, &entry),
+    };
+    Ok((entry, noted.err()))
 }
 
 /// What is seen, by a device of its own, so that the window's image goes on.

@@ -122,6 +122,7 @@ impl Open {
         self.state.dual.end();
         self.state.mmode = Default::default();
         self.state.poses = Default::default();
+        self.state.lesson.leave();
         self.state.planes = Default::default();
         self.state.files.opening = false;
         self.state.files.close();
