@@ -1,9 +1,10 @@
-//! Frames in the formats of others: what files of zea and of UFF hold of them.
+//! Frames in the formats of others: what files of zea and of UFF hold of them; the probe in the terms of DICOM.
 
 use std::path::Path;
 
 use glam::{DAffine3, DQuat};
 
+use crate::output::dicom::Transducer;
 use crate::output::{uff, zea};
 use crate::probe::{Kind, Probe};
 use crate::scene::Scene;
@@ -220,6 +221,15 @@ impl Frames {
         let axial = self.poses.len() * self.probe.scanlines as usize * self.probe.samples as usize;
         let factor = self.rf.len() / axial.max(1);
         (factor, places(&self.probe, factor as u32))
+    }
+}
+
+/// Shape of the probe in the terms of DICOM.
+pub fn transducer(probe: &Probe) -> Transducer {
+    match probe.kind {
+        Kind::Convex { .. } => Transducer::Curved,
+        Kind::Linear { .. } => Transducer::Linear,
+        Kind::Phased { .. } => Transducer::Phased,
     }
 }
 

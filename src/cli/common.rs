@@ -11,9 +11,7 @@ use miette::{IntoDiagnostic, Report, Result, miette};
 
 use insonify::gpu::{Device, DeviceOptions, GpuError, cache_folder};
 use insonify::output;
-use insonify::output::dicom::Transducer;
 use insonify::output::files::{self, Draft};
-use insonify::probe::{Kind, Probe};
 use insonify::scene::file::{self, override_of};
 use insonify::scene::{Scene, shipped};
 use insonify::settings::{Quality, Simulation};
@@ -223,15 +221,6 @@ pub fn writable(path: &Path) -> Result<()> {
 /// Those of [`writable`].
 pub fn writable_folder(path: &Path) -> Result<()> {
     writable(&path.join("-"))
-}
-
-/// Shape of the probe in the terms of DICOM.
-pub fn transducer(probe: &Probe) -> Transducer {
-    match probe.kind {
-        Kind::Convex { .. } => Transducer::Curved,
-        Kind::Linear { .. } => Transducer::Linear,
-        Kind::Phased { .. } => Transducer::Phased,
-    }
 }
 
 /// Uploads a scene, and reports on standard error which parts of it the device had to change.

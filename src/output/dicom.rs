@@ -1,5 +1,5 @@
-//! DICOM files: loops (Ultrasound Multi-frame) and volumes (Enhanced US Volume), uncompressed, explicit little
-//! endian.
+//! DICOM files: images (Ultrasound), loops (Ultrasound Multi-frame) and volumes (Enhanced US Volume), uncompressed,
+//! explicit little endian.
 //!
 //! Written with `dicom-object`, which knows types, paddings and lengths. Volumes are read by our own bounded
 //! reader, which never allocates what a file only declares.
@@ -8,9 +8,11 @@ use std::path::{Path, PathBuf};
 
 mod cine;
 mod data;
+mod study;
 mod volume;
 
-pub use cine::{About, Loop};
+pub use cine::{About, Loop, still};
+pub use study::{Patient, Study};
 pub use volume::{Motion, Volume};
 
 /// Reason for which a file was not written.

@@ -15,7 +15,9 @@ use self::files::Claim;
 use super::deaths::CAPTURE;
 use super::engine::Frame;
 use crate::exam::{Picture, Report};
+use crate::exchange;
 use crate::gpu::{GpuError, Screenshot};
+use crate::output::dicom::{self, About, DicomError, Study};
 use crate::output::movie::MovieError;
 use crate::output::mp4::Mp4Error;
 use crate::output::picture::grey_png;
@@ -46,6 +48,11 @@ pub(super) enum CaptureError {
         /// The system's message.
         cause: String,
     },
+    /// A DICOM file cannot be made.
+    #[error(
+        "{0}. Name a folder that can be written to and has room, or mark a shorter loop; nothing is lost"
+    )]
+    Dicom(#[from] DicomError),
     /// A film cannot be made.
     #[error("{0}; the loop stays")]
     Mp4(#[from] Mp4Error),
@@ -102,6 +109,20 @@ pub(super) struct Still {
     pub(super) marked: Option<Screenshot>,
     /// The M-mode strip, while it is drawn.
     pub(super) strip: Option<SavedStrip>,
+    /// What a DICOM file says of it; none where none is wanted.
+    pub(super) dicom: Option<About>,
+}
+
+/// What a DICOM file says of images of a scene that are as large as `frame`.
+pub(super) fn about(frame: &Frame, scene: &str, study: Study) -> About {
+    About {
+        name: scene.to_owned(),
+        pitch: frame.sector.pitch,
+        corner: [frame.sector.left, frame.sector.top],
+        frequency: frame.probe.frequency,
+        transducer: exchange::transducer(&frame.probe),
+        study: Some(study),
+    }
 }
 
 /// Progress of a capture.
@@ -153,7 +174,8 @@ impl Captures {
         Self { jobs: Vec::new(), done: channel(), wake: Arc::new(wake) }
     }
 
-    /// Saves an image as `STEM-NNNN.png` in a folder, which is made where it does not exist.
+    /// Saves an image as `STEM-NNNN.png`, and as `STEM-NNNN.dcm` where that is wanted, in a folder, which is made where
+    /// it does not exist.
     pub(super) fn still(&mut self, folder: PathBuf, stem: String, still: Still) {
         self.begin(1, move |_| {
             let rgba = still.frame.image.read_back()?;
@@ -171,6 +193,11 @@ impl Captures {
                 sidecar.insert("marked_file".into(), files::name(&file));
                 files::write_new(&file, &files::colour_png(shot.size, &shot.rgba))?;
             }
+            if let Some(about) = still.dicom {
+                let file = claim.add(".dcm");
+                sidecar.insert("dicom_file".into(), files::name(&file));
+                dicom::still(&file, about, [width, height], &rgba)?;
+            }
             if let Some(strip) = still.strip {
                 strip.write(&mut claim, &mut sidecar)?;
             }
@@ -179,7 +206,7 @@ impl Captures {
         });
     }
 
-    /// Saves images as `STEM-NNNN.gif`, as `STEM-NNNN.mp4`, or as `STEM-NNNN/0000.png` and so on.
+    /// Saves images as `STEM-NNNN.gif`, `.mp4` or `.dcm`, or as `STEM-NNNN/0000.png` and so on.
     pub(super) fn clip(&mut self, folder: PathBuf, stem: String, clip: Clip) {
         let total = clip.frames.len() as u32;
         self.begin(total, move |progress| clip.write(&folder, &stem, progress));

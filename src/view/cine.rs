@@ -91,10 +91,11 @@ fn choose(ui: &mut Ui, format: &mut Format) {
         Format::Gif => "GIF".to_owned(),
         Format::Mp4 => "MP4".to_owned(),
         Format::Sequence => "PNGs".to_owned(),
+        Format::Dicom => "DICOM".to_owned(),
     };
-    let tip = "How a clip is saved (F3): an animated GIF, an MP4 film (the program ffmpeg makes it), or a folder of \
-               PNG files";
-    let all = [Format::Gif, Format::Mp4, Format::Sequence];
+    let tip = "How a clip is saved (F3): an animated GIF, an MP4 film (the program ffmpeg makes it), a folder of PNG \
+               files, or DICOM; with DICOM chosen, a still (F2) is saved as DICOM beside its PNG, too";
+    let all = [Format::Gif, Format::Mp4, Format::Sequence, Format::Dicom];
     style::choice(ui, ("format", 56.0), format, &all, name).on_hover_text(tip);
 }
 

@@ -8,13 +8,20 @@ use super::model::sheet::What;
 use super::state::State;
 use super::style::{self, button};
 use crate::exam::{Line, Measured, Report, Worksheet};
-use crate::settings::Words as _;
+use crate::output::dicom::{Patient, Study};
+use crate::settings::{Exam, Words as _};
 
 /// Width of the worksheet, points.
 pub(super) const WIDTH: f32 = 300.0;
 
-/// What the head of a report says of the examination; typed.
-const FIELDS: [&str; 5] = ["Patient", "Number", "Born", "Examiner", "Question"];
+/// What reports and DICOM files say of the examination, with the form in which DICOM has it; typed.
+const FIELDS: [(&str, &str); 5] = [
+    ("Patient", "family^given"),
+    ("Number", ""),
+    ("Born", "1990-04-12"),
+    ("Examiner", "family^given"),
+    ("Question", ""),
+];
 
 /// The state of the worksheet: it is not saved with the scene.
 #[derive(Default)]
@@ -23,6 +30,24 @@ pub(super) struct Examination {
     pub(super) open: bool,
     fields: [String; FIELDS.len()],
     findings: String,
+    /// The study of the patient that was last typed.
+    study: Option<Study>,
+}
+
+impl Examination {
+    /// The study that DICOM files belong to: a new one where another patient is typed.
+    pub(super) fn study(&mut self, exam: Exam) -> Study {
+        let typed = self.fields.each_ref().map(|text| text.trim().to_owned());
+        let [name, number, born, examiner, question] = typed;
+        let patient = Patient { name, number, born };
+        let same = self.study.take().filter(|study| study.patient == patient);
+        let mut study = same.unwrap_or_else(|| Study::begin(patient));
+        study.examiner = examiner;
+        study.question = question;
+        study.exam = exam.word().to_owned();
+        self.study = Some(study.clone());
+        study
+    }
 }
 
 /// The worksheet of all measurements, on the image and off it; its sources are places in [`Marks::iter`].
@@ -63,9 +88,10 @@ pub(super) fn show(ui: &mut Ui, model: &mut Model, state: &mut State) {
         ui.separator();
         let exam = &mut state.exam;
         Grid::new("exam").num_columns(2).show(ui, |ui| {
-            for (name, text) in FIELDS.iter().zip(&mut exam.fields) {
+            for ((name, form), text) in FIELDS.iter().zip(&mut exam.fields) {
                 ui.label(*name);
-                ui.add(TextEdit::singleline(text).desired_width(200.0).char_limit(200));
+                let field = TextEdit::singleline(text).hint_text(*form);
+                ui.add(field.desired_width(200.0).char_limit(200));
                 ui.end_row();
             }
         });
@@ -127,7 +153,7 @@ fn measured(ui: &mut Ui, line: &Line) -> Option<usize> {
 }
 
 fn report(model: &Model, exam: &Examination, worksheet: Worksheet) -> Report {
-    let typed = FIELDS.iter().zip(&exam.fields).map(|(name, text)| (*name, text.clone()));
+    let typed = FIELDS.iter().zip(&exam.fields).map(|((name, _), text)| (*name, text.clone()));
     let made = Local::now().format("%Y-%m-%d %H:%M").to_string();
     let known = [("Date", made), ("Scene", model.title.clone())];
     Report {

@@ -4,10 +4,11 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
+use dicom_core::chrono::{Local, SecondsFormat};
 use glam::{DAffine3, DVec2};
 use serde_json::{Value, json};
 
-use super::captures::{Captures, Clip, Format, SavedStrip, Sidecar, Still};
+use super::captures::{self, Captures, Clip, Format, SavedStrip, Sidecar, Still};
 use super::dual::Dual;
 use super::engine::Frame;
 use super::model::cine::Limit;
@@ -17,6 +18,7 @@ use super::model::{Axis, Cine, Model};
 use super::saved::Notices;
 use crate::exam::Report;
 use crate::gpu::{DeviceInfo, Image, Screenshot};
+use crate::output::dicom::Study;
 use crate::sim::facts::{self, Area};
 
 /// Most frames of the loop.
@@ -42,7 +44,7 @@ pub(super) struct Tools {
     pub(super) captures: Captures,
     /// Folder of the captures.
     pub(super) folder: PathBuf,
-    /// File format of clips.
+    /// File format of clips; with DICOM, of stills as well.
     pub(super) format: Format,
     /// Messages about captures.
     pub(super) notices: Notices,
@@ -168,12 +170,14 @@ impl Tools {
         self.due.is_some() || self.captures.running().next().is_some()
     }
 
-    /// Saves the wanted content. `marked` is the picture of the window around the image, `strip` that of M-mode.
+    /// Saves the wanted content. `marked` is the picture of the window around the image, `strip` that of M-mode,
+    /// `study` what DICOM files belong to.
     pub(super) fn save(
         &mut self,
         model: &Model,
         marked: Option<Screenshot>,
         strip: impl FnOnce() -> Option<SavedStrip>,
+        study: impl FnOnce() -> Study,
     ) {
         let Some(wanted) = self.due.take() else {
             return;
@@ -191,18 +195,20 @@ impl Tools {
                 if let Some(body) = &model.body {
                     sidecar.insert("body_mark".into(), body.json());
                 }
-                let still = Still { frame, sidecar, marked, strip: strip() };
+                let dicom = (self.format == Format::Dicom)
+                    .then(|| captures::about(&frame, &model.title, study()));
+                let still = Still { frame, sidecar, marked, strip: strip(), dicom };
                 self.captures.still(folder, stem, still);
             }
             Wanted::Clip => {
-                let clip = Clip { strip: strip(), ..self.marked_loop(model, &frame) };
+                let clip = Clip { strip: strip(), ..self.marked_loop(model, &frame, study()) };
                 self.captures.clip(folder, stem, clip);
             }
         }
     }
 
     /// The marked part of the loop at the speed at which it plays.
-    fn marked_loop(&self, model: &Model, shown: &Frame) -> Clip {
+    fn marked_loop(&self, model: &Model, shown: &Frame, study: Study) -> Clip {
         let (mut frames, mut end) = (Vec::new(), 0.0);
         let (mut times, mut all_settings) = (Vec::new(), Vec::<Value>::new());
         let mut last: Option<&Frame> = None;
@@ -227,7 +233,10 @@ impl Tools {
             last = Some(frame);
             frames.push((frame.clone(), end));
         }
-        let mut sidecar = self.about(model, shown);
+        // All images get the size of the largest.
+        let largest = frames.iter().map(|(frame, _)| frame).max_by_key(|f| f.image.extent());
+        let largest = largest.unwrap_or(shown);
+        let mut sidecar = self.about(model, largest);
         for key in ["time_s", "pose", "quality"] {
             sidecar.shift_remove(key);
         }
@@ -236,7 +245,8 @@ impl Tools {
         sidecar.insert("settings".into(), all_settings.into());
         let moments: Vec<Moment> = frames.iter().map(|(frame, _)| frame.moment()).collect();
         sidecar.extend(sidecar::marks(model.sheet.all(), &moments));
-        Clip { frames, sidecar, format: self.format, strip: None }
+        let about = captures::about(largest, &model.title, study);
+        Clip { frames, sidecar, format: self.format, about, strip: None }
     }
 
     /// The text common to pictures and clips.
@@ -249,6 +259,7 @@ impl Tools {
         };
         let said = json!({
             "program": concat!("insonify ", env!("CARGO_PKG_VERSION")),
+            "saved": Local::now().to_rfc3339_opts(SecondsFormat::Secs, false),
             "scene": model.title,
             "scene_file": model.file.path.display().to_string(),
             "device": self.device,

@@ -11,7 +11,7 @@ mod volumes;
 
 use std::path::Path;
 
-use insonify::output::dicom::{About, Loop, Transducer};
+use insonify::output::dicom::{self, About, Loop, Patient, Study, Transducer};
 use insonify::scene::Scene;
 use program::insonify;
 use python::{errors, numbers, python, run};
@@ -117,6 +117,7 @@ fn colours_and_odd_sizes_are_read_back() {
         corner: [-0.3, 0.05],
         frequency: 3.5,
         transducer: Transducer::Curved,
+        study: None,
     };
     let grey = [10, 10, 10, 255, 0, 0, 0, 0, 30, 30, 30, 255];
     let color = [10, 20, 30, 255, 9, 9, 9, 0, 200, 0, 100, 255];
@@ -143,5 +144,43 @@ fn colours_and_odd_sizes_are_read_back() {
         }
         assert_eq!(found["kilohertz"], 3500);
         assert_eq!(found["photometric"], if frames.len() > 1 { "RGB" } else { "MONOCHROME2" });
+    }
+}
+
+#[test]
+fn an_image_and_a_loop_of_a_patient_are_sound() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let patient = Patient {
+        name: "Müller^Anna".to_owned(),
+        number: "77-a".to_owned(),
+        born: "12.4.1990".to_owned(),
+    };
+    let mut typed = Study::begin(patient);
+    typed.examiner = "Weiß".to_owned();
+    typed.question = "Zyste?".to_owned();
+    typed.exam = "abdomen".to_owned();
+    let frame = [10, 10, 10, 255, 0, 0, 0, 0, 30, 30, 30, 255];
+    for (name, study) in [("typed", typed), ("empty", Study::begin(Patient::default()))] {
+        let about = About {
+            name: "Liver".to_owned(),
+            pitch: 0.2,
+            corner: [-0.3, 0.05],
+            frequency: 5.0,
+            transducer: Transducer::Linear,
+            study: Some(study),
+        };
+        let [image, film] =
+            ["image", "loop"].map(|kind| folder.path().join(name.to_owned() + kind));
+        dicom::still(&image, about.clone(), [3, 1], &frame).expect("written");
+        let mut made = Loop::new(&film, about);
+        for _ in 0..3 {
+            made.add(3, 1, &frame).expect("room");
+        }
+        made.finish_at(&[40.0, 100.0, 100.0 + 100.0 / 3.0]).expect("written");
+        for (file, kind) in [(image, "USImage"), (film, "USMultiFrameImage")] {
+            if let Some(errors) = errors(&file, kind) {
+                assert!(errors.is_empty(), "{name} {kind}: {errors:?}");
+            }
+        }
     }
 }

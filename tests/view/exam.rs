@@ -135,9 +135,9 @@ fn a_loop_becomes_a_film_where_there_is_an_encoder() {
     desk.settle(super::IMAGE);
     desk.press(Key::Space);
     desk.settle(super::IMAGE);
-    // The list at the bar's right end: GIF, MP4, PNGs.
+    // The list at the bar's right end: GIF, MP4, PNGs, DICOM.
     desk.click((907, 702));
-    desk.click((900, 658));
+    desk.click((900, 637));
     desk.press(Key::F3);
     let clip = sidecar(&mut desk, &captures, "cyst-and-wires-0001.json");
     assert_eq!(clip["file"], "cyst-and-wires-0001.mp4");

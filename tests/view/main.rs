@@ -9,6 +9,7 @@ mod beside;
 mod client;
 mod contact;
 mod desk;
+mod dicom;
 mod exam;
 mod framing;
 mod lesson;

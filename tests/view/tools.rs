@@ -103,7 +103,7 @@ fn a_frozen_loop_shows_and_saves_what_was_imaged_before() {
     assert!(frames[0].as_raw() == saved.to_rgba8().as_raw(), "it begins with the first");
     // The loop as single pictures, which the list at the bar's right end offers.
     desk.click((907, 702));
-    desk.click((900, 679));
+    desk.click((900, 658));
     desk.press(Key::F3);
     sidecar(&mut desk, &captures, "cyst-and-wires-0003.json");
     for (index, frame) in frames.iter().enumerate() {

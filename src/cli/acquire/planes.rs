@@ -3,12 +3,11 @@
 use glam::{DAffine3, DMat3, DVec3};
 
 use insonify::acquire::{Station, middle};
+use insonify::exchange;
 use insonify::output::dicom::{self, Motion};
 use insonify::scene::Scene;
 use insonify::scene::tracker::Axes;
 use insonify::volume::{Volume, Voxels};
-
-use crate::cli::common;
 
 /// Probe space from the transducer's frame of DICOM: x across, y in depth, z so that the three are right-handed.
 fn probe_from_transducer() -> DAffine3 {
@@ -42,7 +41,7 @@ pub fn of(volume: &Volume, scene: &Scene, stations: &[Station]) -> dicom::Volume
         patient_from_transducer: patient_from_world * world_from_probe * probe_from_transducer(),
         motion: motion(stations),
         duration: stations[stations.len() - 1].time - stations[0].time,
-        transducer: common::transducer(&scene.probe),
+        transducer: exchange::transducer(&scene.probe),
         focus: scene.probe.focus,
         depth: scene.probe.depth,
     }

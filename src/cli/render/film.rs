@@ -268,6 +268,7 @@ fn about(scene: &Scene, simulator: &Simulator) -> About {
         pitch,
         corner,
         frequency: scene.probe.frequency,
-        transducer: common::transducer(&scene.probe),
+        transducer: exchange::transducer(&scene.probe),
+        study: None,
     }
 }

@@ -1,19 +1,25 @@
-//! Loops: Ultrasound Multi-frame Image Storage (PS3.3, A.7), with the size of a pixel in a region.
+//! Images and loops: Ultrasound Image Storage and Ultrasound Multi-frame Image Storage (PS3.3, A.6 and A.7), with the
+//! size of a pixel in a region.
 
 use std::path::{Path, PathBuf};
 
+use dicom_core::Tag;
 use dicom_dictionary_std::{tags, uids};
 
 use super::data::{DataSet, Frames, MAX_PIXELS};
-use super::{DicomError, Transducer};
+use super::{DicomError, Study, Transducer};
 
 /// Code of centimetres in a region (PS3.3, C.8.5.5.1.15).
 const CENTIMETRES: u16 = 3;
+/// Most frames with a time each: numbers in text of 17 bytes, in an element of 16-bit length.
+const MOST_TIMED: usize = 0xfffe / 17;
+/// What each file says of itself, whatever is typed.
+const COMMENT: &str = "Simulated: not of a patient, not for diagnosis";
 
-/// Scene, scale and pace of a loop.
+/// Scene, scale and study of an image or a loop.
 #[derive(Clone, Debug, PartialEq)]
 pub struct About {
-    /// Name of what is imaged; it stands for the patient's.
+    /// Name of what is imaged; without a study it stands for the patient's.
     pub name: String,
     /// Edge of a pixel, mm.
     pub pitch: f64,
@@ -23,6 +29,8 @@ pub struct About {
     pub frequency: f64,
     /// Its shape.
     pub transducer: Transducer,
+    /// Whose image it is; none where nobody says.
+    pub study: Option<Study>,
 }
 
 /// A loop that is being made.
@@ -82,20 +90,78 @@ impl Loop {
     /// # Panics
     /// Without a frame.
     pub fn finish(self, frame_time: f64) -> Result<(), DicomError> {
+        self.write_frames(tags::FRAME_TIME, [frame_time])
+    }
+
+    /// Writes the file; each frame is shown until its own time, ms from the beginning.
+    ///
+    /// # Errors
+    /// More frames than a file can time one by one; errors of the file system.
+    ///
+    /// # Panics
+    /// Without a frame, or with another number of times.
+    pub fn finish_at(self, ends: &[f64]) -> Result<(), DicomError> {
+        assert_eq!(ends.len(), self.frames as usize, "a time for each frame");
+        if ends.len() > MOST_TIMED {
+            let cause = format!("each of its frames has its own time: take at most {MOST_TIMED}");
+            return Err(DicomError::new(&self.path, cause));
+        }
+        let starts = std::iter::once(0.0).chain(ends.iter().copied()).take(ends.len());
+        // Each from the one before, the first from itself.
+        let before = std::iter::once(0.0).chain(starts.clone());
+        let steps = starts.zip(before).map(|(start, before)| start - before);
+        self.write_frames(tags::FRAME_TIME_VECTOR, steps)
+    }
+
+    fn write_frames(
+        self,
+        tag: Tag,
+        times: impl IntoIterator<Item = f64>,
+    ) -> Result<(), DicomError> {
+        let count = self.frames.to_string();
+        self.write(uids::ULTRASOUND_MULTI_FRAME_IMAGE_STORAGE, |data| {
+            data.decimals(tag, times);
+            data.put(tags::FRAME_INCREMENT_POINTER, tag);
+            data.put(tags::NUMBER_OF_FRAMES, count);
+        })
+    }
+
+    /// Writes a file of this class, with what else it has.
+    fn write(self, class: &str, add: impl FnOnce(&mut DataSet)) -> Result<(), DicomError> {
         let [width, height] = self.size.expect("a frame");
         let mut data = DataSet::new();
         data.common(&self.about.name);
+        if let Some(study) = &self.about.study {
+            study.put(&mut data, &self.about.name);
+        }
+        data.put(tags::IMAGE_COMMENTS, COMMENT);
         // The fourth value: 2D imaging.
         data.texts(tags::IMAGE_TYPE, &["ORIGINAL", "PRIMARY", "", "0001"]);
         data.put(tags::LATERALITY, "");
         data.put(tags::TRANSDUCER_TYPE, self.about.transducer.term());
-        data.decimals(tags::FRAME_TIME, [frame_time]);
-        data.put(tags::FRAME_INCREMENT_POINTER, tags::FRAME_TIME);
+        add(&mut data);
         data.items(tags::SEQUENCE_OF_ULTRASOUND_REGIONS, [region(&self.about, [width, height])]);
-        let frames = Frames { width, height, count: self.frames, color: self.color };
-        data.pixels(&frames, self.pixels);
-        data.write(&self.path, uids::ULTRASOUND_MULTI_FRAME_IMAGE_STORAGE)
+        data.pixels(&Frames { width, height, color: self.color }, self.pixels);
+        data.write(&self.path, class)
     }
+}
+
+/// Writes a file of one image: RGBA bytes, row by row, taken as [`Loop::add`] takes a frame.
+///
+/// # Errors
+/// More pixels than a file can hold; errors of the file system.
+///
+/// # Panics
+/// When the pixels are not those of the size.
+pub fn still(
+    path: &Path,
+    about: About,
+    [width, height]: [u32; 2],
+    rgba: &[u8],
+) -> Result<(), DicomError> {
+    let mut image = Loop::new(path, about);
+    image.add(width, height, rgba)?;
+    image.write(uids::ULTRASOUND_IMAGE_STORAGE, |_| {})
 }
 
 /// The one region: the whole image, in cm from the middle of the transducer's face (PS3.3, C.8.5.5).

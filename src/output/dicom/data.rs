@@ -18,11 +18,10 @@ pub(super) const MAX_PIXELS: usize = 0xffff_fffe;
 /// A data set in the making. Types of elements are those of the standard's dictionary.
 pub(super) struct DataSet(InMemDicomObject);
 
-/// Size and number of the frames of a file.
+/// Size and colours of the frames of a file.
 pub(super) struct Frames {
     pub width: u32,
     pub height: u32,
-    pub count: u32,
     /// True where a pixel has three values.
     pub color: bool,
 }
@@ -118,7 +117,6 @@ impl DataSet {
         if frames.color {
             self.put(tags::PLANAR_CONFIGURATION, 0u16);
         }
-        self.put(tags::NUMBER_OF_FRAMES, frames.count.to_string());
         self.put(tags::ROWS, short(frames.height));
         self.put(tags::COLUMNS, short(frames.width));
         self.put(tags::BITS_ALLOCATED, 8u16);

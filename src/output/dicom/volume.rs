@@ -96,7 +96,8 @@ impl Volume {
         let now = Utc::now();
         self.image(&mut data, now);
         self.groups(&mut data, now);
-        data.pixels(&Frames { width, height, count, color: false }, self.voxels);
+        data.put(tags::NUMBER_OF_FRAMES, count.to_string());
+        data.pixels(&Frames { width, height, color: false }, self.voxels);
         data.write(path, uids::ENHANCED_US_VOLUME_STORAGE)
     }
 

@@ -98,7 +98,7 @@ fn frames_are_made_even_and_none_is_left_out() {
 #[test]
 fn ffmpeg_makes_an_mp4_of_them() {
     if Mp4::check().is_err() {
-        eprintln!("skipped: no ffmpeg on the PATH");
+        println!("skipped: no ffmpeg on the PATH");
         return;
     }
     let folder = tempfile::tempdir().expect("a folder");

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::files::{self, Claim, scaled};
 use super::{CaptureError, Outcome, Progress, SavedStrip, Sidecar};
+use crate::output::dicom::{About, Loop};
 use crate::output::movie::Movie;
 use crate::output::mp4::{self, Mp4};
 use crate::output::picture::grey_png;
@@ -18,6 +19,8 @@ pub(in crate::view) enum Format {
     Mp4,
     /// A folder of PNG files.
     Sequence,
+    /// One DICOM file; of stills, too.
+    Dicom,
 }
 
 /// Images one after the other, to be saved.
@@ -28,6 +31,8 @@ pub(in crate::view) struct Clip {
     pub(in crate::view) sidecar: Sidecar,
     /// File format.
     pub(in crate::view) format: Format,
+    /// What a DICOM file says of its images.
+    pub(in crate::view) about: About,
     /// The M-mode strip, while it is drawn.
     pub(in crate::view) strip: Option<SavedStrip>,
 }
@@ -37,6 +42,8 @@ enum Reel {
     Gif(Movie),
     Mp4(Mp4),
     Sequence(PathBuf),
+    /// With the time until which each image is shown, ms from the beginning.
+    Dicom(Loop, Vec<f64>),
 }
 
 impl Clip {
@@ -47,6 +54,7 @@ impl Clip {
             Format::Gif => claim.add(".gif"),
             Format::Mp4 => claim.add(".mp4"),
             Format::Sequence => claim.add_folder()?,
+            Format::Dicom => claim.add(".dcm"),
         };
         let mut reel = match self.format {
             Format::Gif => Reel::Gif(Movie::new(&target)?),
@@ -55,6 +63,7 @@ impl Clip {
                 Reel::Mp4(Mp4::new(&target, mp4::rate(ends)))
             }
             Format::Sequence => Reel::Sequence(target.clone()),
+            Format::Dicom => Reel::Dicom(Loop::new(&target, self.about), Vec::new()),
         };
         let extents = self.frames.iter().map(|(frame, _)| frame.image.extent());
         let [width, height, _] = extents.max().unwrap_or_default();
@@ -65,8 +74,10 @@ impl Clip {
             reel.add((index, end), &frame, [width, height])?;
             progress.step();
         }
-        if let Reel::Mp4(film) = reel {
-            film.finish()?;
+        match reel {
+            Reel::Gif(_) | Reel::Sequence(_) => {}
+            Reel::Mp4(film) => film.finish()?,
+            Reel::Dicom(film, ends) => film.finish_at(&ends)?,
         }
         let mut sidecar = self.sidecar;
         sidecar.insert("file".into(), files::name(&target));
@@ -93,6 +104,10 @@ impl Reel {
         match self {
             Self::Gif(movie) => movie.add(width, height, &rgba, end)?,
             Self::Mp4(film) => film.add(width, height, &rgba, end)?,
+            Self::Dicom(film, ends) => {
+                film.add(width, height, &rgba)?;
+                ends.push(1e3 * end);
+            }
             Self::Sequence(folder) => {
                 let pitch = frame.sector.pitch * f64::from(down) / f64::from(height);
                 let file = folder.join(format!("{index:04}.png"));

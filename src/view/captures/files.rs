@@ -27,7 +27,10 @@ impl Claim {
         for number in 1.. {
             let base = format!("{stem}-{number:04}");
             let is_taken = |end: &str| folder.join(format!("{base}{end}")).exists();
-            if ["", ".png", ".gif", ".mp4", "-marked.png", "-mmode.png"].into_iter().any(is_taken) {
+            if ["", ".png", ".gif", ".mp4", ".dcm", "-marked.png", "-mmode.png"]
+                .into_iter()
+                .any(is_taken)
+            {
                 continue;
             }
             let path = folder.join(format!("{base}.json"));
@@ -158,8 +161,9 @@ mod tests {
         assert_eq!(names(&at), ["a-0001.json", "a-0001.png"], "what is not kept is gone");
         // A picture without its sidecar is not written over, either.
         std::fs::write(at.join("a-0002.gif"), "").unwrap();
+        std::fs::write(at.join("a-0003.dcm"), "").unwrap();
         let third = Claim::new(&at, "a").unwrap();
-        assert_eq!(third.base, "a-0003");
+        assert_eq!(third.base, "a-0004");
         assert!(write_new(&at.join("a-0001.png"), b"3").is_err());
     }
 

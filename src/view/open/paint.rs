@@ -98,10 +98,11 @@ impl Open {
             cropped(picture, [r.left(), r.top(), r.right(), r.bottom()])
         });
         let strip = || mmode::saved(&self.model, &self.state.mmode);
+        let study = || self.state.exam.study(self.model.settings.imaging.exam);
         // Asked for while it was drawn: the next drawing is the one without buttons.
         match wanted && !marked {
             true => context.request_repaint(),
-            false => tools.save(&self.model, around, strip),
+            false => tools.save(&self.model, around, strip, study),
         }
         self.painted = (began, began.elapsed());
         self.schedule(&output);
