@@ -1,5 +1,6 @@
 //! The B-mode image on the screen, with what a scanner writes around it.
 
+use egui::text::{LayoutJob, TextWrapping};
 use egui::{Align2, Color32, FontId, Mesh, Pos2, Rect, Shape, Stroke, Ui, pos2, vec2};
 use glam::{DVec2, dvec2};
 
@@ -16,6 +17,8 @@ const NARROW: f32 = 440.0;
 const MARGINS: [f32; 4] = [52.0, 58.0, 64.0, 16.0];
 /// Least height of the grey bar; with less room there is none, points.
 const LEAST_BAR: f32 = 30.0;
+/// Room for the word at the upper right, with both edges, points.
+const STATE: f32 = 104.0;
 /// Distance of the ruler from the image, points.
 const RULER: f32 = 12.0;
 /// Width of the time-gain curve between the grey bar and the image, points.
@@ -175,7 +178,9 @@ fn texts(
     }
     let at = area.left_top() + vec2(12.0, 8.0);
     let title = FontId::proportional(15.0);
-    painter.text(at, Align2::LEFT_TOP, &model.title, title, style::TEXT);
+    let mut job = LayoutJob::simple_singleline(model.title.clone(), title, style::TEXT);
+    job.wrap = TextWrapping::truncate_at_width(area.width() - STATE);
+    painter.galley(at, painter.layout_job(job), style::TEXT);
     let small = FontId::proportional(12.0);
     let below = at + vec2(0.0, 20.0);
     let left = painter.text(below, Align2::LEFT_TOP, settings, small.clone(), style::FAINT);

@@ -84,7 +84,7 @@ impl Dual {
         let held = self.held.as_ref()?;
         let place = bmode::show(ui, area, (&held.frame, true), model, framing)?;
         calipers::show_held(ui, &held.marks, &place);
-        let corner = pos2(area.right() - 34.0, area.top() + 30.0);
+        let corner = pos2(area.right() - 82.0, area.top() + 9.0);
         let button = || egui::Button::new("x").small();
         if !bare
             && ui

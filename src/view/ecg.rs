@@ -12,6 +12,8 @@ const SHOWN: f64 = 3.0;
 /// Height of the R wave, and distance of the baseline from the lower edge, points.
 const HEIGHT: f32 = 26.0;
 const BASE: f32 = 20.0;
+/// Height of an image below which the trace would hide it, points.
+const LEAST: f32 = 120.0;
 /// The trace is green on scanners.
 const COLOUR: Color32 = Color32::from_rgb(90, 220, 120);
 
@@ -22,7 +24,7 @@ pub(super) fn show(
     (frame, newest): (&Frame, Option<f64>),
     beat: Option<Clock>,
 ) {
-    let Some(beat) = beat else { return };
+    let Some(beat) = beat.filter(|_| place.room.height() > LEAST) else { return };
     let [begin, end] = span(frame.seconds, newest.unwrap_or(frame.seconds));
     let room = place.room;
     let x = |seconds: f64| room.left() + room.width() * ((seconds - begin) / SHOWN) as f32;

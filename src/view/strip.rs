@@ -20,6 +20,9 @@ const PITCH: [f32; 2] = [26.0, 30.0];
 /// Height below which there is little room, points.
 const LITTLE: f32 = 420.0;
 
+/// Height of the texts above the image, points.
+const TEXTS: f32 = 44.0;
+
 /// Draws a sign into its room in a colour.
 type Icon = fn(&Painter, Rect, Color32);
 
@@ -109,7 +112,8 @@ pub(super) fn top(area: Rect) -> f32 {
     area.bottom() - 8.0 - height(area.height())
 }
 
-/// Draws the toolbar into the lower left corner; returns whether the image is to be held beside the live one.
+/// Draws the toolbar into the lower left corner, unless it would cover the texts above the image: keys do the same. Returns
+/// whether the image is to be held beside the live one.
 pub(super) fn show(
     ui: &mut Ui,
     tools: &mut Tools,
@@ -117,6 +121,9 @@ pub(super) fn show(
     (mark, exam, dual): (&mut Option<BodyMark>, Exam, bool),
 ) -> bool {
     let area = ui.max_rect();
+    if top(area) < area.top() + TEXTS {
+        return false;
+    }
     let has_marks = !sheet.marks().is_empty();
     let pitch = pitch(area.height());
     let mut at = pos2(area.left() + 8.0, top(area));

@@ -106,9 +106,9 @@ fn control<T>(ui: &mut Ui, path: &str, row: &Row<T>, settings: &mut T) {
 
 /// A slider over the usual values; the keyboard takes every value that a scene file may give.
 fn slider(ui: &mut Ui, path: &str, facts: &Facts, value: &mut f64) {
-    // A long unit needs the room.
+    // A long unit needs the room, also within a section of a section.
     let beyond = facts.unit().len().saturating_sub(5) as f32;
-    ui.spacing_mut().slider_width -= 7.0 * beyond;
+    ui.spacing_mut().slider_width -= 12.0 * beyond;
     let slider = over(facts, value).max_decimals(4).suffix(format!(" {}", facts.unit()));
     explained(ui.add(slider), path, facts);
     let [least, most] = facts.range;
