@@ -15,6 +15,12 @@ pub(super) fn list() -> Vec<PathBuf> {
     files.filter(|file| file.is_file()).take(MOST).collect()
 }
 
+/// The files that were opened last before the one at `path`.
+pub(super) fn before(path: &Path) -> Vec<PathBuf> {
+    let open = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    list().into_iter().filter(|file| *file != open).collect()
+}
+
 /// Puts a file at the head of the list, unless it ships: the gallery shows those. Where the list cannot be written it stays
 /// as it is: nothing depends on it.
 pub(super) fn add(file: &Path) {

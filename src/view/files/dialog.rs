@@ -43,7 +43,7 @@ impl Dialog {
             // Not yet looked into.
             folder: PathBuf::from("\0"),
             listed: Vec::new(),
-            recent: recent::list(),
+            recent: recent::before(path),
             replaces: false,
         }
     }
