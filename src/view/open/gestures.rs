@@ -1,11 +1,12 @@
-//! Input in steps that the interface understands: press, movement and release apart.
+//! Input in steps that the interface understands: press, movement and release apart, and what is typed after a click.
 
-use egui::{Event, RawInput};
+use egui::{Event, Key, RawInput};
 
 /// The input in passes, to be given to the interface one after the other: in none does the pointer move before or
-/// after a button changes. Where the window is drawn more slowly than a hand drags, a whole drag may lie between two
-/// drawings. egui takes all events of one input to have happened at the pointer's last place, and would see no
-/// drag.
+/// after a button changes, and nothing is typed after a click or a key that may have moved the keyboard to another field,
+/// or away from it. Where the window is drawn more slowly than a hand drags or types, all of that may lie between two
+/// drawings. egui takes all events of one input to have happened at the pointer's last place and with the keyboard where
+/// it was, would see no drag, and what is typed into a field would drive the scanner.
 pub(super) fn passes(mut input: RawInput) -> Vec<RawInput> {
     let mut groups = vec![Vec::new()];
     for event in std::mem::take(&mut input.events) {
@@ -13,6 +14,9 @@ pub(super) fn passes(mut input: RawInput) -> Vec<RawInput> {
         let mixed = match event {
             Event::PointerMoved(_) => group.iter().any(is_button),
             Event::PointerButton { .. } => group.iter().any(is_motion),
+            Event::Key { pressed: true, .. } | Event::Text(_) | Event::Ime(_) | Event::Paste(_) => {
+                group.iter().any(|event| is_button(event) || leaves_field(event))
+            }
             _ => false,
         };
         match mixed {
@@ -30,6 +34,10 @@ fn is_motion(event: &Event) -> bool {
 
 fn is_button(event: &Event) -> bool {
     matches!(event, Event::PointerButton { .. })
+}
+
+fn leaves_field(event: &Event) -> bool {
+    matches!(event, Event::Key { key: Key::Enter | Key::Escape | Key::Tab, pressed: true, .. })
 }
 
 #[cfg(test)]
@@ -93,6 +101,41 @@ mod tests {
         let events = vec![moved(100.0), button(100.0, true), button(100.0, false), moved(5.0)];
         let (by, clicks) = drawn(&context, passes(input(events)));
         assert_eq!((by, clicks), (Vec2::ZERO, 1));
+    }
+
+    #[test]
+    fn what_is_typed_between_two_pictures_goes_where_the_click_was_and_no_farther_than_enter() {
+        let key = |key| Event::Key {
+            key,
+            physical_key: None,
+            pressed: true,
+            repeat: false,
+            modifiers: Modifiers::NONE,
+        };
+        let typed = |letter: &str| [key(Key::C), Event::Text(letter.to_owned())];
+        let mut events = vec![moved(30.0), button(30.0, true), button(30.0, false)];
+        events.extend(typed("c"));
+        events.extend(typed("d"));
+        events.extend([key(Key::Enter), key(Key::ArrowRight)]);
+        // The text of a field, and the keys that come while it does not have the keyboard.
+        let run = |inputs: Vec<RawInput>| {
+            let (context, mut text, mut free) = (Context::default(), String::new(), 0);
+            for input in [vec![input(Vec::new()); 2], inputs].concat() {
+                let mut output = context.run_ui(input, |ui| {
+                    if !ui.ctx().egui_wants_keyboard_input() {
+                        let is_key = |event: &&Event| matches!(event, Event::Key { .. });
+                        free += ui.input(|input| input.events.iter().filter(is_key).count());
+                    }
+                    let rect = Rect::from_min_size(pos2(20.0, 40.0), Vec2::new(200.0, 20.0));
+                    ui.put(rect, egui::TextEdit::singleline(&mut text));
+                });
+                output.textures_delta.clear();
+            }
+            (text, free)
+        };
+        let (text, free) = run(vec![input(events.clone())]);
+        assert!(text.is_empty() && free == 4, "as egui has it: {text} {free}");
+        assert_eq!(run(passes(input(events))), ("cd".to_owned(), 1));
     }
 
     #[test]
