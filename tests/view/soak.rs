@@ -114,11 +114,15 @@ fn for_a_long_time_memory_stays_and_no_image_is_lost() {
     let (images, clients) = (&report["images"], &report["clients"]);
     let received = received.load(Ordering::Relaxed);
     println!("{images} {clients}, {received} received");
-    assert_eq!(images["unseen"], 0, "all that was made was shown");
-    assert_eq!(clients["images_dropped"], 0, "and sent");
-    // The last one may be under way at the end.
-    let sent = clients["images_sent"].as_u64().expect("a number");
+    let number = |value: &serde_json::Value| value.as_u64().expect("a number");
+    let [shown, unseen] = [&images["shown"], &images["unseen"]].map(number);
+    let sent = number(&clients["images_sent"]);
+    assert_eq!(clients["images_dropped"], 0, "the client takes them all");
+    // All that was made was sent and received; the last one may be under way at the end.
+    assert!(sent.abs_diff(shown + unseen) <= 1, "{sent} sent of {shown} and {unseen}");
     assert!(sent - received <= 1, "{sent} sent, {received} received");
+    // A window that is not drawn within 40 ms shows the next image at once; the loop has both.
+    assert!(1000 * unseen <= shown, "{unseen} of {shown} never came to the screen");
     // The loop is full, or every image in it has its last size, by the second quarter.
     let quarter = held.len() / 4;
     if let (false, 1..) = (layers, quarter) {
