@@ -4,7 +4,8 @@ mod history;
 mod marking;
 mod measured;
 
-use std::time::{Duration, Instant};
+use std::sync::Arc;
+use std::time::Instant;
 
 use egui::{Align2, Color32, Context, RichText, Shape, Stroke, TextEdit, Ui, vec2};
 use glam::{DAffine3, DVec3};
@@ -23,13 +24,10 @@ use crate::teach::{Score, guide};
 
 /// Width of the panel, points.
 const WIDTH: f32 = 300.0;
-/// Time between two questions whether a score is there.
-const ASK: Duration = Duration::from_millis(50);
 /// Colour of the target, and of the way that was gone.
 const GHOST: Color32 = Color32::from_rgb(120, 210, 120);
 
 /// The panel's state; not saved.
-#[derive(Default)]
 pub(super) struct Lesson {
     /// True while the panel is open.
     pub(super) open: bool,
@@ -53,6 +51,8 @@ pub(super) struct Lesson {
     learner: String,
     measured: Measured,
     answer: Option<usize>,
+    /// Called by the thread that scores, at its end.
+    wake: Arc<dyn Fn() + Send + Sync>,
 }
 
 /// An attempt under way.
@@ -62,6 +62,26 @@ struct Run {
 }
 
 impl Lesson {
+    /// A panel that is closed. `wake` is called, from another thread, when a score is there.
+    pub(super) fn new(wake: Arc<dyn Fn() + Send + Sync>) -> Self {
+        Self {
+            open: false,
+            chosen: 0,
+            examiner: false,
+            guide: false,
+            hints: 0,
+            run: None,
+            marking: None,
+            result: None,
+            page: None,
+            problem: None,
+            learner: String::new(),
+            measured: Measured::default(),
+            answer: None,
+            wake,
+        }
+    }
+
     /// The target to be shown in 3D, while the guide shows it.
     fn ghost(&self, model: &Model) -> Option<DAffine3> {
         let goal = &model.tasks.get(self.chosen)?.goal;
@@ -90,7 +110,7 @@ impl Lesson {
     pub(super) fn leave(&mut self) {
         let Self { open, examiner, guide, .. } = *self;
         let learner = std::mem::take(&mut self.learner);
-        *self = Self { open, examiner, guide, learner, ..Self::default() };
+        *self = Self { open, examiner, guide, learner, ..Self::new(self.wake.clone()) };
     }
 }
 
@@ -106,22 +126,18 @@ pub(super) fn show(ctx: &Context, model: &mut Model, lesson: &mut Lesson, now: I
         }
         run.guided |= guides || model.layer.shown;
     }
-    if let Some(marking) = &lesson.marking {
-        match marking.done() {
-            // The thread that scores cannot wake the window.
-            None => ctx.request_repaint_after(ASK),
-            Some(found) => {
-                lesson.marking = None;
-                match found {
-                    Ok((attempt, problem)) => {
-                        (lesson.result, lesson.problem) = (Some(attempt), problem);
-                    }
-                    Err(problem) => lesson.problem = Some(problem),
-                }
-                // The 3D view, with the way, has been drawn before.
-                ctx.request_repaint();
+    if let Some(marking) = &lesson.marking
+        && let Some(found) = marking.done()
+    {
+        lesson.marking = None;
+        match found {
+            Ok((attempt, problem)) => {
+                (lesson.result, lesson.problem) = (Some(attempt), problem);
             }
+            Err(problem) => lesson.problem = Some(problem),
         }
+        // The 3D view, with the way, has been drawn before.
+        ctx.request_repaint();
     }
     if !lesson.open {
         return;
@@ -292,7 +308,7 @@ fn during(ui: &mut Ui, model: &mut Model, lesson: &mut Lesson, now: Instant) {
                 learner: lesson.learner.trim().to_owned(),
                 folder: folder(),
             };
-            match marked(order) {
+            match marked(order, lesson.wake.clone()) {
                 Ok(marking) => lesson.marking = Some(marking),
                 Err(problem) => lesson.problem = Some(problem.to_string()),
             }

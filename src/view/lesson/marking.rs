@@ -1,6 +1,7 @@
 //! The score of an attempt, found on a thread of its own: structures that are to be seen take a frame.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::thread;
 
@@ -52,12 +53,13 @@ impl Marking {
     }
 }
 
-/// Begins to score.
-pub(super) fn marked(order: Order) -> std::io::Result<Marking> {
+/// Begins to score; calls `wake` when the score is there.
+pub(super) fn marked(order: Order, wake: Arc<dyn Fn() + Send + Sync>) -> std::io::Result<Marking> {
     let (give, take) = channel();
     thread::Builder::new().name("marking".to_owned()).spawn(move || {
         // A window that is gone needs no score.
         let _ = give.send(mark(order));
+        wake();
     })?;
     Ok(Marking(take))
 }

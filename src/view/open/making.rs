@@ -15,6 +15,7 @@ use crate::view::files::Files;
 use crate::view::gallery::Gallery;
 use crate::view::inputs::{self, Inputs};
 use crate::view::keeper::Keeper;
+use crate::view::lesson::Lesson;
 use crate::view::link::Bell;
 use crate::view::model::{File, StoredTrajectory};
 use crate::view::opening::{self, Opened};
@@ -71,7 +72,7 @@ impl Open {
             help: false,
             exam: Examination::default(),
             gallery: Gallery::new(plan.options.gallery),
-            lesson: Default::default(),
+            lesson: Lesson::new(Arc::new(session::waker(plan.proxy.clone()))),
             mmode: Default::default(),
             poses: Default::default(),
             tissue: 0,
