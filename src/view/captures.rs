@@ -21,7 +21,7 @@ use crate::output::dicom::{self, About, DicomError, Study};
 use crate::output::movie::MovieError;
 use crate::output::mp4::Mp4Error;
 use crate::output::picture::grey_png;
-pub(super) use clip::{Clip, Format};
+pub(super) use clip::{Clip, Format, largest};
 
 /// The settings written beside a picture: see `docs/window.md`.
 pub(super) type Sidecar = Map<String, Value>;
@@ -109,11 +109,11 @@ pub(super) struct Still {
     pub(super) marked: Option<Screenshot>,
     /// The M-mode strip, while it is drawn.
     pub(super) strip: Option<SavedStrip>,
-    /// What a DICOM file says of it; none where none is wanted.
+    /// Head of its DICOM file; none where none is wanted.
     pub(super) dicom: Option<About>,
 }
 
-/// What a DICOM file says of images of a scene that are as large as `frame`.
+/// Head of a DICOM file with images of a scene that are as large as `frame`.
 pub(super) fn about(frame: &Frame, scene: &str, study: Study) -> About {
     About {
         name: scene.to_owned(),

@@ -84,15 +84,13 @@ impl Dual {
         let held = self.held.as_ref()?;
         let place = bmode::show(ui, area, (&held.frame, true), model, framing)?;
         calipers::show_held(ui, &held.marks, &place);
-        let corner = pos2(area.right() - 82.0, area.top() + 9.0);
-        let button = || egui::Button::new("x").small();
-        if !bare
-            && ui
-                .put(Rect::from_min_size(corner, vec2(22.0, 18.0)), button())
-                .on_hover_text("One image again (Shift+Y)")
-                .clicked()
-        {
-            self.end();
+        if !bare {
+            let corner = pos2(area.right() - 82.0, area.top() + 9.0);
+            let room = Rect::from_min_size(corner, vec2(22.0, 18.0));
+            let button = ui.put(room, egui::Button::new("x").small());
+            if button.on_hover_text("One image again (Shift+Y)").clicked() {
+                self.end();
+            }
         }
         Some(place)
     }

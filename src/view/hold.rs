@@ -189,18 +189,21 @@ fn lean(delta: Vec2, place: &Place, camera: &Camera, pose: &DAffine3) -> Option<
 /// Returns whether the pointer is on the probe: on its head, which is as wide as the face, or near its handle.
 fn is_probe(at: Pos2, place: &Place, camera: &Camera, pose: &DAffine3, probe: &Probe) -> bool {
     let seen = |point: DVec3| place.project(camera, pose.transform_point3(point));
-    let row = |lift: f64| {
-        let face = (0..=8).map(|i| probe.face(f64::from(i) / 8.0 - 0.5, 0.0).0);
-        let row = face.map(|point| seen(point + DVec3::NEG_Z * lift));
-        row.collect::<Option<Vec<Pos2>>>()
-    };
-    let (Some(mut head), Some(top)) = (row(0.0), row(HEAD)) else {
+    let across = |lift: f64| row(probe, 8, 0.0, lift).map(seen).collect::<Option<Vec<Pos2>>>();
+    let (Some(mut head), Some(top)) = (across(0.0), across(HEAD)) else {
         return false;
     };
     head.extend(top.into_iter().rev());
     let handle = [DVec3::ZERO, DVec3::NEG_Z * HANDLE].map(seen);
     let handle = handle.into_iter().flatten().collect();
     encloses(&head, at) || [head, handle].iter().any(|line: &Vec<Pos2>| is_near(line, at))
+}
+
+/// Points in `parts` equal steps across the probe's face, `along` it from its middle by a share of its height, and `lift`
+/// mm above: probe space, mm.
+fn row(probe: &Probe, parts: u32, along: f64, lift: f64) -> impl Iterator<Item = DVec3> {
+    let share = move |i: u32| f64::from(i) / f64::from(parts) - 0.5;
+    (0..=parts).map(move |i| probe.face(share(i), along).0 + DVec3::NEG_Z * lift)
 }
 
 fn is_near(line: &[Pos2], at: Pos2) -> bool {
@@ -266,15 +269,12 @@ fn ghost(painter: &Painter, place: &Place, camera: &Camera, pose: &DAffine3, pro
     let [r, g, b, _] = style::ACCENT.to_array();
     let colour = Color32::from_rgba_unmultiplied(r, g, b, 190);
     let line = Stroke::new(1.6, colour);
-    let row = |along: f64, lift: f64| {
-        let points = (0..=16).map(|i| probe.face(f64::from(i) / 16.0 - 0.5, along).0);
-        points.filter_map(|point| seen(point + DVec3::NEG_Z * lift)).collect::<Vec<Pos2>>()
-    };
+    let across = |along: f64, lift: f64| row(probe, 16, along, lift).filter_map(seen);
     let sides = [(-0.5, 0.0), (0.5, 0.0), (-0.5, HEAD), (0.5, HEAD)];
-    let corners = sides.into_iter().flat_map(|(along, lift)| row(along, lift)).collect();
+    let corners = sides.into_iter().flat_map(|(along, lift)| across(along, lift)).collect();
     let fill = colour.gamma_multiply(0.2);
     painter.add(Shape::convex_polygon(hull(corners), fill, line));
-    painter.add(Shape::line(row(0.0, 0.0), line));
+    painter.add(Shape::line(across(0.0, 0.0).collect(), line));
     // The mark of the first scanline.
     if let Some(mark) = seen(probe.face(-0.5, 0.0).0) {
         painter.circle_filled(mark, 3.0, colour);

@@ -26,6 +26,12 @@ const SCENE: &str = "scene.toml";
 const SESSION: &str = "session.json";
 const LOCK: &str = "lock";
 
+/// The program's folder in the system's one for the state of programs; none where the system has none.
+pub(super) fn state_folder() -> Option<PathBuf> {
+    let state = dirs::state_dir().or_else(dirs::data_local_dir);
+    state.map(|folder| folder.join("insonify"))
+}
+
 /// What `session.json` says.
 #[derive(Serialize, Deserialize)]
 struct Session {
@@ -98,9 +104,7 @@ impl Default for Keeper {
 
 impl Keeper {
     pub(super) fn new() -> Self {
-        let state = dirs::state_dir().or_else(dirs::data_local_dir);
-        let all = state.map(|folder| folder.join("insonify").join("unsaved"));
-        Self { all, ..Self::default() }
+        Self { all: state_folder().map(|folder| folder.join("unsaved")), ..Self::default() }
     }
 
     /// The newest session of the scene file at `path` that has ended without being asked.

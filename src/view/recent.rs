@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use super::keeper;
 use crate::output::files;
 use crate::scene::shipped;
 
@@ -43,6 +44,5 @@ pub(super) fn add(file: &Path) {
 }
 
 fn place() -> Option<PathBuf> {
-    let state = dirs::state_dir().or_else(dirs::data_local_dir);
-    state.map(|folder| folder.join("insonify").join("recent"))
+    keeper::state_folder().map(|folder| folder.join("recent"))
 }

@@ -233,9 +233,7 @@ impl Tools {
             last = Some(frame);
             frames.push((frame.clone(), end));
         }
-        // All images get the size of the largest.
-        let largest = frames.iter().map(|(frame, _)| frame).max_by_key(|f| f.image.extent());
-        let largest = largest.unwrap_or(shown);
+        let largest = captures::largest(&frames).unwrap_or(shown);
         let mut sidecar = self.about(model, largest);
         for key in ["time_s", "pose", "quality"] {
             sidecar.shift_remove(key);

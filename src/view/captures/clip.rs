@@ -31,7 +31,7 @@ pub(in crate::view) struct Clip {
     pub(in crate::view) sidecar: Sidecar,
     /// File format.
     pub(in crate::view) format: Format,
-    /// What a DICOM file says of its images.
+    /// Head of its DICOM file.
     pub(in crate::view) about: About,
     /// The M-mode strip, while it is drawn.
     pub(in crate::view) strip: Option<SavedStrip>,
@@ -44,6 +44,11 @@ enum Reel {
     Sequence(PathBuf),
     /// With the time until which each image is shown, ms from the beginning.
     Dicom(Loop, Vec<f64>),
+}
+
+/// The largest of a clip's images, whose size all get.
+pub(in crate::view) fn largest(frames: &[(Frame, f64)]) -> Option<&Frame> {
+    frames.iter().map(|(frame, _)| frame).max_by_key(|frame| frame.image.extent())
 }
 
 impl Clip {
@@ -65,8 +70,8 @@ impl Clip {
             Format::Sequence => Reel::Sequence(target.clone()),
             Format::Dicom => Reel::Dicom(Loop::new(&target, self.about), Vec::new()),
         };
-        let extents = self.frames.iter().map(|(frame, _)| frame.image.extent());
-        let [width, height, _] = extents.max().unwrap_or_default();
+        let [width, height, _] =
+            largest(&self.frames).map_or_else(Default::default, |frame| frame.image.extent());
         for (index, (frame, end)) in self.frames.into_iter().enumerate() {
             if progress.is_cancelled() {
                 return Ok(None);

@@ -42,8 +42,12 @@ impl Hold {
     /// The place that a probe at `pose` is held to. While the face's centre rests, the place stays the same,
     /// however the probe is turned.
     fn spot(&self, hand: &Hand<'_>, pose: &DAffine3) -> Spot {
-        let known = self.spot.filter(|(centre, _)| *centre == pose.translation);
-        known.map_or_else(|| hand.held(pose), |(_, spot)| spot)
+        self.known(pose).unwrap_or_else(|| hand.held(pose))
+    }
+
+    /// The place that the probe was held to, where nothing else has moved its face's centre since.
+    fn known(&self, pose: &DAffine3) -> Option<Spot> {
+        self.spot.filter(|(centre, _)| *centre == pose.translation).map(|(_, spot)| spot)
     }
 
     /// Depth to which the pointer presses it in: as it is, or gently where it is held above the skin.
@@ -69,7 +73,7 @@ impl Hold {
         let hand = Hand::new(skin, probe);
         let from = self.spot(&hand, pose);
         // Put here by something else, it is pressed as that has pressed it; out of a hand's reach it is free.
-        if self.spot.is_none_or(|(centre, _)| centre != pose.translation) {
+        if self.known(pose).is_none() {
             let [least, most] = PRESSES;
             let within = |press: &f64| (least..=most).contains(press);
             self.press = hand.pressed(pose, &from).filter(within)?;
