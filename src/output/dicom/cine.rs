@@ -13,7 +13,7 @@ use super::{DicomError, Study, Transducer};
 const CENTIMETRES: u16 = 3;
 /// Most frames with a time each: numbers in text of 17 bytes, in an element of 16-bit length.
 const MOST_TIMED: usize = 0xfffe / 17;
-/// What each file says of itself, whatever is typed.
+/// Comment in each file, whatever is typed.
 const COMMENT: &str = "Simulated: not of a patient, not for diagnosis";
 
 /// Scene, scale and study of an image or a loop.

@@ -28,11 +28,11 @@ pub struct Patient {
 /// One examination of a patient: files that have it belong together.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Study {
-    /// Who is examined.
+    /// The patient, as typed.
     pub patient: Patient,
-    /// Who examines; may be empty.
+    /// Name of the examiner; may be empty.
     pub examiner: String,
-    /// Why; may be empty.
+    /// Reason of the examination; may be empty.
     pub question: String,
     /// Kind of the examination.
     pub exam: String,
