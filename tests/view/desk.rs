@@ -219,6 +219,18 @@ impl Desk {
         self.quiet(part, Duration::from_millis(250), false);
     }
 
+    /// Writes the whole display as PNG beside the tests; returns where.
+    fn shot(&self, name: &str) -> String {
+        let screen = &self.x.setup().roots[0];
+        let [width, height] = [screen.width_in_pixels, screen.height_in_pixels];
+        let pixels = self.grab([0, 0, width, height]);
+        let file =
+            Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{}.png", name.replace(' ', "-")));
+        let (width, height) = (width.into(), height.into());
+        image::save_buffer(&file, &pixels, width, height, image::ColorType::Rgb8).expect("written");
+        file.display().to_string()
+    }
+
     /// Waits for the image at the scene's own quality, which comes once everything is at rest: until then the program
     /// works. `works`: whether that counts for all of the time, or only at its end. A program kept from the processor
     /// has work to do although it uses no time: its threads' states show that.
@@ -273,7 +285,9 @@ impl Desk {
             if let Some(status) = self.program.try_wait().expect("a child") {
                 panic!("the program ended ({status}) before {what}");
             }
-            assert!(began.elapsed() < PATIENCE, "waited in vain for {what}");
+            if began.elapsed() > PATIENCE {
+                panic!("waited in vain for {what}; what is shown: {}", self.shot(what));
+            }
             std::thread::sleep(Duration::from_millis(30));
         }
     }

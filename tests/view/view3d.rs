@@ -5,8 +5,13 @@ use super::{CONSOLE, IMAGE, SCENE, brightness, difference};
 
 /// The middle of the view, between the image and the console; without buttons and text.
 const VIEW: [u16; 4] = [610, 60, 310, 560];
-/// The same below the words that explain a button under the pointer.
-const BELOW: [u16; 4] = [610, 140, 310, 480];
+
+/// Returns whether a part of the window has the blue of the cyst's surface in it. How fine the picture around it is
+/// depends on how busy the machine is: two pictures of one anatomy may differ by more than the section does.
+fn shows_cyst(part: &[u8]) -> bool {
+    let blue = |p: &&[u8]| i32::from(p[2]) > i32::from(p[1]) + 30 && p[1] > p[0];
+    part.chunks_exact(3).filter(blue).count() > 300
+}
 
 #[test]
 fn the_eye_goes_around_and_the_image_stays() {
@@ -49,16 +54,16 @@ fn tissues_are_hidden_and_the_view_closes() {
     let console = desk.settle(CONSOLE);
     // "Cut": the half before the image plane goes, and comes back.
     let whole = desk.rest(VIEW);
-    let anatomy = desk.rest(BELOW);
+    assert!(shows_cyst(&whole));
     desk.click((663, 17));
-    desk.wait_for("the section", |d| difference(&d.grab(BELOW), &anatomy) > 0.2);
+    desk.wait_for("the section", |d| !shows_cyst(&d.grab(VIEW)));
     desk.click((663, 17));
-    desk.wait_for("the whole cyst", |d| difference(&d.grab(BELOW), &anatomy) < 0.1);
+    desk.wait_for("the whole cyst", |d| shows_cyst(&d.grab(VIEW)));
     // The list, and "None" in it.
     desk.click((620, 17));
-    let open = desk.rest(VIEW);
+    desk.rest(VIEW);
     desk.click((647, 56));
-    desk.wait_for("no cyst", |d| difference(&d.grab(VIEW), &open) > 0.2);
+    desk.wait_for("no cyst", |d| !shows_cyst(&d.grab(VIEW)));
     desk.rest(VIEW);
     desk.press(Key::Letter('v'));
     desk.wait_for("the image in the view's place", |d| difference(&d.grab(VIEW), &whole) > 5.0);
@@ -80,10 +85,11 @@ fn the_edge_between_image_and_view_is_dragged_and_comes_back() {
     // Over to the right the image takes the room, and the camera stays where it is.
     desk.pull((586, 300), (690, 300));
     desk.wait_for("the edge to move", |d| difference(&d.grab(edge(586)), &before) > 3.0);
-    desk.rest(VIEW);
-    // Two clicks on it.
+    let moved = difference(&desk.rest(VIEW), &view);
+    // Two clicks on it; the picture may be of another fineness than before.
     desk.click((690, 300));
     desk.click((690, 300));
-    desk.wait_for("the edge to come back", |d| difference(&d.grab(VIEW), &view) < 0.5);
+    desk.wait_for("the edge to come back", |d| difference(&d.grab(VIEW), &view) < 0.2 * moved);
+    desk.wait_for("the edge itself", |d| difference(&d.grab(edge(586)), &before) < 1.0);
     desk.quit();
 }
