@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use insonify::gpu::{
     AddressMode, Binding, Buffer, BufferKind, Device, DeviceOptions, Filter, GpuError, Image,
-    ImageDim, ImageFormat, Kernel, Sampler, list_devices, test_device,
+    ImageDim, ImageFormat, Kernel, Sampler, list_devices, lone_test_device,
 };
 
 #[path = "gpu/accel.rs"]
@@ -87,7 +87,7 @@ fn a_device_is_chosen_by_index_or_part_of_its_name() {
 
 #[test]
 fn uploads_read_back_and_memory_is_counted_and_returned() {
-    let device = test_device();
+    let device = lone_test_device();
     let before = device.memory().current;
     let a = device.buffer("a", 4000, BufferKind::Storage).unwrap();
     let b = device.buffer("b", 10, BufferKind::Storage).unwrap();
@@ -115,7 +115,7 @@ fn uploads_read_back_and_memory_is_counted_and_returned() {
 
 #[test]
 fn uploads_larger_than_the_staging_memory_arrive_whole() {
-    let device = test_device();
+    let device = lone_test_device();
     let count = (33 << 20) / 4 + 3; // beyond the 32 MiB of one submission
     let values: Vec<u32> = (0..count).map(|i: u32| i.wrapping_mul(2654435761)).collect();
     let buffer = buffer_of(&device, "large", &values);
@@ -126,7 +126,7 @@ fn uploads_larger_than_the_staging_memory_arrive_whole() {
 
 #[test]
 fn a_buffer_beyond_the_limit_is_refused_with_the_limit() {
-    let device = test_device();
+    let device = lone_test_device();
     let limit = device.limits().max_storage_buffer_bytes;
     let error = device.buffer("echoes", limit + 4, BufferKind::Storage).err().expect("too large");
     let text = error.to_string();
@@ -136,7 +136,7 @@ fn a_buffer_beyond_the_limit_is_refused_with_the_limit() {
 
 #[test]
 fn a_kernel_is_reflected_and_specialized() {
-    let device = test_device();
+    let device = lone_test_device();
     let kernel = add_kernel(&device, 3);
     assert_eq!(kernel.local_size(), [ADD_GROUP, 1, 1]);
     assert_eq!(kernel.push_constant_bytes(), 8);
@@ -170,7 +170,7 @@ fn a_kernel_is_reflected_and_specialized() {
 
 #[test]
 fn a_dispatch_that_does_not_fit_its_kernel_is_refused_by_name() {
-    let device = test_device();
+    let device = lone_test_device();
     let kernel = add_kernel(&device, 1);
     let a = buffer_of(&device, "a", &[1]);
     let sampler = Sampler::new(&device, "s", Filter::Nearest, AddressMode::ClampToEdge).unwrap();
@@ -204,7 +204,7 @@ fn a_dispatch_that_does_not_fit_its_kernel_is_refused_by_name() {
 /// A volume and a plane with linear ramps are read between their texels, the sum is written.
 #[test]
 fn images_are_uploaded_sampled_written_and_read_back() {
-    let device = test_device();
+    let device = lone_test_device();
     let spirv = words(include_bytes!("gpu/sample.spv"));
     let kernel = Kernel::new(&device, "sample", &spirv, &[]).unwrap();
     let image =

@@ -22,6 +22,9 @@ if [ -z "${LP_NATIVE_VECTOR_WIDTH:-}${MESA_SHADER_CACHE_DIR:-}" ]; then
   export LP_NATIVE_VECTOR_WIDTH=128 MESA_SHADER_CACHE_DIR=${XDG_CACHE_HOME:-$HOME/.cache}/insonify/mesa
   mkdir -p "$MESA_SHADER_CACHE_DIR"
 fi
+# Tests of the window wait for it more than they compute: at least four at once.
+threads=$(nproc)
+export RUST_TEST_THREADS=${RUST_TEST_THREADS:-$((threads < 4 ? 4 : threads))}
 [ -e ../shared/data ] || echo "skipped: no shared data (tests on real meshes)"
 failed=0
 if [ ${#long[@]} -eq 0 ]; then

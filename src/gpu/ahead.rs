@@ -44,14 +44,14 @@ fn dispatch_nothing(device: &Arc<Device>, kernel: &Kernel) -> Result<(), GpuErro
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gpu::test_device;
+    use crate::gpu::lone_test_device;
 
     #[test]
     fn a_kernel_is_dispatched_with_nothing_to_do() {
         let words = |bytes: &[u8]| -> Vec<u32> { bytemuck::pod_collect_to_vec(bytes) };
         let add = words(include_bytes!("../../tests/gpu/add.spv"));
         let sample = words(include_bytes!("../../tests/gpu/sample.spv"));
-        let device = test_device();
+        let device = lone_test_device();
         for spirv in [&add, &sample] {
             let kernel = Kernel::when_needed(&device, "it", spirv, &[]).unwrap();
             dispatch_nothing(&device, &kernel).unwrap();

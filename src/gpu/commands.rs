@@ -212,7 +212,7 @@ impl<'a> Commands<'a> {
         descriptors::check(self.device(), kernel, bindings)?;
         let pipeline = kernel.pipeline()?;
         self.slot.first_use(kernel);
-        let sets = self.slot.descriptors.allocate(&kernel.0.set_layouts)?;
+        let sets = self.slot.descriptors.allocate(&kernel.0.pipeline.set_layouts)?;
         descriptors::write(self.device(), kernel, bindings, &sets);
         self.keep(&kernel.0);
         for (info, binding) in kernel.bindings().iter().zip(bindings) {
@@ -251,11 +251,18 @@ impl<'a> Commands<'a> {
             let point = vk::PipelineBindPoint::COMPUTE;
             raw.cmd_bind_pipeline(commands, point, pipeline);
             if !sets.is_empty() {
-                raw.cmd_bind_descriptor_sets(commands, point, kernel.0.layout, 0, sets, &[]);
+                raw.cmd_bind_descriptor_sets(
+                    commands,
+                    point,
+                    kernel.0.pipeline.layout,
+                    0,
+                    sets,
+                    &[],
+                );
             }
             if !push.is_empty() {
                 let stage = vk::ShaderStageFlags::COMPUTE;
-                raw.cmd_push_constants(commands, kernel.0.layout, stage, 0, push);
+                raw.cmd_push_constants(commands, kernel.0.pipeline.layout, stage, 0, push);
             }
             if base == [0; 3] {
                 raw.cmd_dispatch(commands, groups[0], groups[1], groups[2]);

@@ -4,7 +4,7 @@ mod create;
 
 use std::ffi::CString;
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
 use ash::{ext, khr, vk};
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
@@ -15,6 +15,7 @@ use super::error::GpuError;
 use super::instance::{Instance, LOADER_LISTS, ValidationLog};
 use super::kept::{self, PipelineStore};
 use super::memory::{MemoryUse, MemoryUseCounter};
+use super::pipelines::Pipelines;
 use super::queues::Queues;
 
 /// Size of the blocks that the allocator takes from the driver. Its default of 256 MiB would make the memory
@@ -88,6 +89,7 @@ pub struct Device {
     pub(crate) physical: vk::PhysicalDevice,
     pub(crate) memory_use: MemoryUseCounter,
     pub(crate) kept: PipelineStore,
+    pub(crate) pipelines: Pipelines,
     ray_query: bool,
     /// True for Mesa's driver for the processor.
     jit: bool,
@@ -178,6 +180,7 @@ impl Device {
             physical: adapter.physical,
             memory_use: MemoryUseCounter::default(),
             kept,
+            pipelines: Pipelines::default(),
             ray_query: adapter.info.ray_query,
             jit,
             limits: Limits {
@@ -332,21 +335,33 @@ impl Device {
 impl Drop for Device {
     fn drop(&mut self) {
         let allocator = self.allocator.get_mut().take();
-        let _changing = LOADER_LISTS.write();
-        // SAFETY: everything made from the device holds it alive, so nothing is left but the cache
+        // SAFETY: everything made from the device holds it alive, so nothing is left but the pipelines, the cache
         // and the allocator's blocks. A lost device may be destroyed without waiting.
         unsafe {
             let _ = self.raw.device_wait_idle();
-            drop(allocator);
+            // Before the lock: one that is being made on a device of its own needs it to end.
+            self.pipelines.destroy();
+        }
+        let _changing = LOADER_LISTS.write();
+        drop(allocator);
+        // SAFETY: as above.
+        unsafe {
             self.kept.destroy();
             self.raw.destroy_device(None);
         }
     }
 }
 
-/// A device for tests: the best one, with validation. Panics with the remedy where the driver or
-/// the layer is missing, because a test that skips validation in silence proves nothing.
+/// The device of all tests in this process: the best one, with validation. Pipelines are made once for all of them, and
+/// a message of validation fails every test that looks. Panics with the remedy where the driver or the layer is missing,
+/// because a test that skips validation in silence proves nothing.
 pub fn test_device() -> Arc<Device> {
+    static DEVICE: LazyLock<Arc<Device>> = LazyLock::new(lone_test_device);
+    DEVICE.clone()
+}
+
+/// Like [`test_device`], but nobody else's: for tests that count what is on it, or that it is dropped.
+pub fn lone_test_device() -> Arc<Device> {
     let options = DeviceOptions { validate: true, ..Default::default() };
     match Device::new(&options) {
         Ok(device) => device,

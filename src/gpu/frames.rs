@@ -265,7 +265,7 @@ impl SubmissionSlot {
 
     /// Notes that the submission runs `kernel`.
     pub(crate) fn first_use(&mut self, kernel: &Kernel) {
-        let id = kernel.0.id;
+        let id = kernel.0.pipeline.id;
         if self.device.kept.is_new(id) && !self.new_kernels.contains(&id) {
             self.new_kernels.push(id);
         }

@@ -311,11 +311,11 @@ impl Device {
 #[cfg(test)]
 mod tests {
     use super::BufferKind;
-    use crate::gpu::{Image, ImageDim, ImageFormat, test_device};
+    use crate::gpu::{Image, ImageDim, ImageFormat, lone_test_device};
 
     #[test]
     fn fresh_memory_is_poisoned_while_validating() {
-        let device = test_device();
+        let device = lone_test_device();
         let buffer = device.buffer("fresh", 1000, BufferKind::Storage).unwrap();
         assert_eq!(device.read_back(&buffer).unwrap(), [0xcd; 1000]);
         for format in [ImageFormat::R8Unorm, ImageFormat::R16Unorm, ImageFormat::R32Float] {

@@ -7,6 +7,7 @@ use glam::DVec3;
 ///
 /// The edge functions are scalar triple products (Pluecker coordinates of the ray and the edge), of
 /// which two triangles that share an edge compute exactly opposite values: no ray passes between.
+#[inline]
 pub fn crossing(corners: [DVec3; 3], origin: DVec3, direction: DVec3) -> Option<[f64; 3]> {
     let [a, b, c] = corners.map(|corner| corner - origin);
     let weights = [direction.dot(c.cross(b)), direction.dot(a.cross(c)), direction.dot(b.cross(a))];

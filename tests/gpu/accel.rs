@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use insonify::gpu::{
     Binding, Blas, BlasInput, BlasOptions, Buffer, BufferKind, Device, DeviceOptions, GpuError,
-    Kernel, Stage, Tlas, TlasInstance, build_times, refit_times, test_device,
+    Kernel, Stage, Tlas, TlasInstance, build_times, lone_test_device, refit_times,
 };
 
 use super::skip::{Lacking, skip};
@@ -23,7 +23,7 @@ fn shifted(z: f32) -> [[f32; 4]; 3] {
 
 /// A device with ray queries, or `None` with a message that the test is not run.
 pub fn ray_query_device() -> Option<Arc<Device>> {
-    let device = test_device();
+    let device = lone_test_device();
     if !device.supports_ray_query() {
         skip(Lacking::Tool, &format!("'{}' has no ray queries", device.name()));
         return None;

@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
-use insonify::gpu::{Binding, Buffer, BufferKind, Device, Frames, Stage, test_device};
+use insonify::gpu::{Binding, Buffer, BufferKind, Device, Frames, Stage, lone_test_device};
 
 use super::{add_kernel, assert_clean, buffer_of};
 
 #[test]
 fn two_frames_in_flight_keep_their_own_parameters_and_times() {
-    let device = test_device();
+    let device = lone_test_device();
     let kernel = add_kernel(&device, 1);
     let count = 10_000;
     let parameter = device.buffer("parameter", 4 * count, BufferKind::Storage).unwrap();
@@ -55,7 +55,7 @@ fn two_frames_in_flight_keep_their_own_parameters_and_times() {
 
 #[test]
 fn objects_of_a_submission_may_be_dropped_before_it_has_run() {
-    let device = test_device();
+    let device = lone_test_device();
     let mut frames = Frames::new(&device, "frame").unwrap();
     let b = buffer_of(&device, "b", &[0; 4096]);
     let mut commands = frames.begin().unwrap();
@@ -97,7 +97,7 @@ fn two_dispatches(device: &Arc<Device>, from: usize, to: usize, barrier: bool) -
 
 #[test]
 fn a_barrier_between_dispatches_is_enough() {
-    let device = test_device();
+    let device = lone_test_device();
     assert!(two_dispatches(&device, 1, 2, true).iter().all(|&v| v == 3));
     two_dispatches(&device, 2, 1, true);
     two_dispatches(&device, 1, 0, true);
@@ -116,7 +116,7 @@ fn a_missing_barrier_between_dispatches_is_reported() {
         (2, 0, "'second/add' writes 'a' that 'first/add' reads"),
     ];
     for (from, to, expected) in cases {
-        let device = test_device();
+        let device = lone_test_device();
         two_dispatches(&device, from, to, false);
         let messages = device.validation_messages();
         assert!(messages.iter().any(|m| m.contains(expected)), "{messages:#?}");
@@ -126,7 +126,7 @@ fn a_missing_barrier_between_dispatches_is_reported() {
 /// The layers themselves work: a fill read by a dispatch without a barrier.
 #[test]
 fn the_layers_report_a_deliberate_mistake() {
-    let device = test_device();
+    let device = lone_test_device();
     let kernel = add_kernel(&device, 1);
     let [a, b] = ["a", "b"].map(|name| buffer_of(&device, name, &[1; 64]));
     device

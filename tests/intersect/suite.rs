@@ -1,28 +1,20 @@
-//! Uses of the device by this suite only: one device for all tests, moving instances, planted errors.
+//! Uses of the device by this suite only: moving instances, planted errors.
 
-use std::sync::{Arc, OnceLock};
-
-use insonify::gpu::{Binding, Buffer, BufferKind, Device, test_device};
+use insonify::gpu::{Binding, Buffer, BufferKind, test_device};
 use insonify::scene::Scene;
 use insonify::sim::bvh::Splits;
 use insonify::sim::tracer::Tracer;
 
 use super::device::Rig;
 
-/// One device for all tests: validation makes opening one slow. Dispatches take turns.
-fn device() -> Arc<Device> {
-    static DEVICE: OnceLock<Arc<Device>> = OnceLock::new();
-    DEVICE.get_or_init(test_device).clone()
-}
-
 impl Rig {
     pub fn new(scene: &Scene, tracer: Tracer) -> Self {
-        Self::on(&device(), scene, tracer)
+        Self::on(&test_device(), scene, tracer)
     }
 
     /// The compute tracer with trees built by `splits`.
     pub fn split(scene: &Scene, splits: Splits) -> Self {
-        Self::with_splits(&device(), scene, Tracer::Bvh, splits)
+        Self::with_splits(&test_device(), scene, Tracer::Bvh, splits)
     }
 
     /// No validation message so far.

@@ -1,6 +1,8 @@
 //! Changing shapes: hits of rays, and the cost of a union box.
 
+use insonify::scene::Scene;
 use insonify::sim::tracer::Tracer;
+use insonify_tools::reference::intersect::Hit;
 use rayon::prelude::*;
 
 use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};
@@ -8,7 +10,7 @@ use crate::intersections::TRACERS;
 use crate::intersections::beating::{KEYFRAMES, beating, show, strategies, union_box};
 use crate::intersections::compare::{by_aim, expected, slips, wrong};
 use crate::intersections::device::Rig;
-use crate::intersections::rays::rays;
+use crate::intersections::rays::{Ray, rays};
 
 /// Check T32.
 pub fn every_strategy_shows_the_keyframe() -> Check {
@@ -28,6 +30,7 @@ const RAYS: usize = 600;
 
 fn run(bench: &Bench, physics: Physics) -> Outcome {
     let mut out = Outcome::default();
+    let mut references = References::default();
     for tracer in TRACERS {
         for strategy in strategies(tracer) {
             let mut scene = beating(strategy);
@@ -41,9 +44,8 @@ fn run(bench: &Bench, physics: Physics) -> Outcome {
                     Physics::Planted => scene.instances[3].shown = true,
                 }
                 let still = scene.still();
-                let rays = rays(&still, RAYS, k as u64);
-                let exact: Vec<_> = rays.par_iter().map(|r| expected(&still, r)).collect();
-                let found = by_aim(&wrong(&still, &rays, &exact, &rig.found(&rays)));
+                let (rays, exact) = references.of(&still, k);
+                let found = by_aim(&wrong(&still, rays, exact, &rig.found(rays)));
                 bad.iter_mut().zip(found).for_each(|(sum, n)| *sum += n);
             }
             let half = KEYFRAMES * RAYS / 2;
@@ -59,6 +61,29 @@ fn run(bench: &Bench, physics: Physics) -> Outcome {
     }
     union_boxes(bench, physics, &mut out);
     out
+}
+
+/// Vertices and triangles of each instance.
+type Shapes = Vec<(Vec<[f32; 3]>, Vec<[u32; 3]>)>;
+
+/// Rays and what they meet by brute force, once for each keyframe's shapes: most strategies show the same.
+#[derive(Default)]
+struct References(Vec<(usize, Shapes, Vec<Ray>, Vec<Option<Hit>>)>);
+
+impl References {
+    fn of(&mut self, still: &Scene, k: usize) -> (&[Ray], &[Option<Hit>]) {
+        let meshes = still.instances.iter().map(|i| &still.meshes[i.mesh]);
+        let shapes: Shapes = meshes.map(|m| (m.positions.clone(), m.triangles.clone())).collect();
+        let known = self.0.iter().position(|(j, known, ..)| (*j, known) == (k, &shapes));
+        let at = known.unwrap_or_else(|| {
+            let rays = rays(still, RAYS, k as u64);
+            let exact = rays.par_iter().map(|r| expected(still, r)).collect();
+            self.0.push((k, shapes, rays, exact));
+            self.0.len() - 1
+        });
+        let (_, _, rays, exact) = &self.0[at];
+        (rays, exact)
+    }
 }
 
 fn union_boxes(bench: &Bench, physics: Physics, out: &mut Outcome) {

@@ -1,11 +1,11 @@
 use ash::vk;
 
 use super::{QueueUser, SubmissionSlot};
-use crate::gpu::{Commands, GpuError, test_device};
+use crate::gpu::{Commands, GpuError, lone_test_device};
 
 #[test]
 fn stages_in_many_batches_are_timed_and_so_is_what_follows() {
-    let device = test_device();
+    let device = lone_test_device();
     let mut slot = SubmissionSlot::new(&device, "test", QueueUser::Work).unwrap();
     let mut commands = Commands::begin(&mut slot, 0).unwrap();
     for _ in 0..4096 {
@@ -26,7 +26,7 @@ fn stages_in_many_batches_are_timed_and_so_is_what_follows() {
 /// No driver at hand can be made to lose its device, so the code is planted.
 #[test]
 fn a_lost_device_names_the_last_pass_that_began() {
-    let device = test_device();
+    let device = lone_test_device();
     let mut slot = SubmissionSlot::new(&device, "test", QueueUser::Work).unwrap();
     let mut commands = Commands::begin(&mut slot, 0).unwrap();
     commands.scope("trace");

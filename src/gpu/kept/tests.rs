@@ -94,7 +94,7 @@ fn a_kernel_that_has_run_is_known_at_the_next_start() {
     };
     let first = device(folder.path());
     let add = kernel(&first, 3);
-    assert!(first.kept.is_new(add.0.id));
+    assert!(first.kept.is_new(add.0.pipeline.id));
     let [source, target] =
         ["source", "target"].map(|name| first.buffer(name, 128, BufferKind::Storage).unwrap());
     let mut frames = Frames::new(&first, "test").unwrap();
@@ -104,13 +104,13 @@ fn a_kernel_that_has_run_is_known_at_the_next_start() {
     let push = vec![0; add.push_constant_bytes()];
     commands.dispatch(&add, [32, 1, 1], &push, &bindings).unwrap();
     commands.submit().unwrap();
-    assert!(first.kept.is_new(add.0.id), "it has not finished");
+    assert!(first.kept.is_new(add.0.pipeline.id), "it has not finished");
     frames.wait().unwrap();
-    assert!(!first.kept.is_new(add.0.id));
+    assert!(!first.kept.is_new(add.0.pipeline.id));
 
     let second = device(folder.path());
-    assert!(!second.kept.is_new(kernel(&second, 3).0.id));
-    assert!(second.kept.is_new(kernel(&second, 4).0.id), "another constant");
+    assert!(!second.kept.is_new(kernel(&second, 3).0.pipeline.id));
+    assert!(second.kept.is_new(kernel(&second, 4).0.pipeline.id), "another constant");
     let [file] = &fs::read_dir(folder.path())
         .unwrap()
         .map(|entry| entry.unwrap().path())
@@ -120,7 +120,7 @@ fn a_kernel_that_has_run_is_known_at_the_next_start() {
     };
     fs::write(file, b"insonify pipelines 1\nnonsense").unwrap();
     let third = device(folder.path());
-    assert!(third.kept.is_new(add.0.id), "a broken file says nothing");
+    assert!(third.kept.is_new(add.0.pipeline.id), "a broken file says nothing");
     for device in [&first, &second, &third] {
         assert_eq!(device.validation_messages(), [""; 0]);
     }
