@@ -178,7 +178,8 @@ fn totals_of_a_scene_are_bounded() {
         fs::write(&path, &text).expect("written");
         let mut command = assert_cmd::Command::new(env!("CARGO_BIN_EXE_insonify"));
         command.arg("render").arg(&path).args(["-o", "/dev/null", "--tracer", "bvh"]);
-        let output = command.timeout(std::time::Duration::from_secs(60)).output().expect("started");
+        let output =
+            command.timeout(std::time::Duration::from_secs(240)).output().expect("started");
         let text = String::from_utf8_lossy(&output.stderr).into_owned();
         refused(&Outcome { code: output.status.code(), text }, &words);
     }

@@ -105,6 +105,7 @@ fn lines_between_images_do_not_change_how_far_labels_say_it_has_moved() {
     };
     let expected = labels(&mut scene, &[]);
     assert!(labels(&mut scene, &[0.12, 0.15, 0.18]) == expected);
+    assert_eq!(test_device().validation_messages(), [""; 0]);
 }
 
 /// A ball of bone that goes 6 mm up and down five times a second below a linear probe.

@@ -307,3 +307,40 @@ fn id(spirv: &[u32], specialization: &[(u32, u32)]) -> u64 {
     }
     digest.finalize()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gpu::{Kernel, lone_test_device};
+
+    fn add(device: &Arc<Device>, factor: u32) -> Kernel {
+        let spirv: Vec<u32> =
+            bytemuck::pod_collect_to_vec(include_bytes!("../../tests/gpu/add.spv"));
+        Kernel::when_needed(device, "add", &spirv, &[(0, 32), (1, factor)]).unwrap()
+    }
+
+    #[test]
+    fn a_pipeline_is_made_once_and_waits_for_the_next_who_needs_it() {
+        let device = lone_test_device();
+        let first = add(&device, 1);
+        let made = first.pipeline().unwrap();
+        assert_eq!(add(&device, 1).pipeline().unwrap(), made);
+        assert_ne!(add(&device, 2).pipeline().unwrap(), made, "another constant");
+        drop(first);
+        assert_eq!(add(&device, 1).pipeline().unwrap(), made);
+        assert_eq!(device.validation_messages(), [""; 0]);
+    }
+
+    #[test]
+    fn what_nobody_uses_makes_room() {
+        let device = lone_test_device();
+        let used = add(&device, 0);
+        let made = used.pipeline().unwrap();
+        for factor in 1..3 * MOST as u32 {
+            add(&device, factor);
+            assert!(device.pipelines.0.lock().len() <= MOST);
+        }
+        assert_eq!(add(&device, 0).pipeline().unwrap(), made, "in use");
+        assert_eq!(device.validation_messages(), [""; 0]);
+    }
+}

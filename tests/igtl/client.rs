@@ -10,7 +10,7 @@ use insonify::scene::Tracker;
 use insonify::sim::layout;
 
 /// Longest wait: on an idle machine everything here is much faster.
-pub const PATIENCE: Duration = Duration::from_secs(20);
+pub const PATIENCE: Duration = Duration::from_secs(120);
 
 /// Short limits, so that a test can wait for them; but a pose never grows old, however busy the
 /// machine is.

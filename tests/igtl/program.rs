@@ -54,7 +54,7 @@ impl Program {
     }
 
     fn wait(&mut self) -> Option<i32> {
-        let end = Instant::now() + Duration::from_secs(60);
+        let end = Instant::now() + Duration::from_secs(240);
         loop {
             if let Some(status) = self.child.try_wait().expect("a child") {
                 return status.code();

@@ -44,7 +44,7 @@ fn run(bench: &Bench, physics: Physics) -> Outcome {
                     Physics::Planted => scene.instances[3].shown = true,
                 }
                 let still = scene.still();
-                let (rays, exact) = references.of(&still, k);
+                let Reference { rays, exact, .. } = references.of(&still, k);
                 let found = by_aim(&wrong(&still, rays, exact, &rig.found(rays)));
                 bad.iter_mut().zip(found).for_each(|(sum, n)| *sum += n);
             }
@@ -66,23 +66,30 @@ fn run(bench: &Bench, physics: Physics) -> Outcome {
 /// Vertices and triangles of each instance.
 type Shapes = Vec<(Vec<[f32; 3]>, Vec<[u32; 3]>)>;
 
-/// Rays and what they meet by brute force, once for each keyframe's shapes: most strategies show the same.
+/// Rays at a keyframe, and what they meet by brute force.
+struct Reference {
+    k: usize,
+    shapes: Shapes,
+    rays: Vec<Ray>,
+    exact: Vec<Option<Hit>>,
+}
+
+/// References, each made once for a keyframe's shapes: most strategies show the same.
 #[derive(Default)]
-struct References(Vec<(usize, Shapes, Vec<Ray>, Vec<Option<Hit>>)>);
+struct References(Vec<Reference>);
 
 impl References {
-    fn of(&mut self, still: &Scene, k: usize) -> (&[Ray], &[Option<Hit>]) {
+    fn of(&mut self, still: &Scene, k: usize) -> &Reference {
         let meshes = still.instances.iter().map(|i| &still.meshes[i.mesh]);
         let shapes: Shapes = meshes.map(|m| (m.positions.clone(), m.triangles.clone())).collect();
-        let known = self.0.iter().position(|(j, known, ..)| (*j, known) == (k, &shapes));
+        let known = self.0.iter().position(|known| (known.k, &known.shapes) == (k, &shapes));
         let at = known.unwrap_or_else(|| {
             let rays = rays(still, RAYS, k as u64);
             let exact = rays.par_iter().map(|r| expected(still, r)).collect();
-            self.0.push((k, shapes, rays, exact));
+            self.0.push(Reference { k, shapes, rays, exact });
             self.0.len() - 1
         });
-        let (_, _, rays, exact) = &self.0[at];
-        (rays, exact)
+        &self.0[at]
     }
 }
 

@@ -11,6 +11,9 @@ use ureq::Agent;
 
 use crate::skip::{Lacking, skip};
 
+/// Longest wait for anything, on a busy machine, too.
+pub const PATIENCE: Duration = Duration::from_secs(240);
+
 /// Codes of keys in WebDriver.
 pub const ENTER: &str = "\u{e007}";
 pub const SPACE: &str = " ";
@@ -53,7 +56,7 @@ impl Browser {
         });
         let agent = Agent::config_builder()
             .http_status_as_error(false)
-            .timeout_global(Some(Duration::from_secs(120)))
+            .timeout_global(Some(PATIENCE))
             .build();
         let port = port.expect("chromedriver tells its port");
         let mut browser = Self {
@@ -125,7 +128,7 @@ impl Browser {
     pub fn wait(&self, script: &str) {
         let begun = Instant::now();
         while self.run(script) != json!(true) {
-            assert!(begun.elapsed() < Duration::from_secs(60), "never: {script}");
+            assert!(begun.elapsed() < PATIENCE, "never: {script}");
             std::thread::sleep(Duration::from_millis(20));
         }
     }

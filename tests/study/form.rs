@@ -8,18 +8,22 @@ use insonify::study::answers::Answers;
 use insonify::study::form::{Case, Form};
 use serde_json::{Value, json};
 
-use crate::browser::{Browser, ENTER, RIGHT, SPACE};
+use crate::browser::{Browser, ENTER, PATIENCE, RIGHT, SPACE};
 use crate::{IMAGES, desk, program};
 
-/// The only file saved since the folder was last emptied; moved out of it.
-fn downloaded(browser: &Browser, to: &Path) -> PathBuf {
+/// Presses the button that saves; the only file in the folder of downloads then, moved out of it.
+fn save(browser: &Browser, to: &Path) -> PathBuf {
+    browser.click("#save");
+    let saved = "return document.getElementById('notice').textContent.startsWith('Saved as')";
+    browser.wait(saved);
     let begun = std::time::Instant::now();
     loop {
         let all = std::fs::read_dir(browser.saved()).expect("a folder").flatten();
-        let whole: Vec<PathBuf> =
-            all.map(|e| e.path()).filter(|p| p.extension().is_some_and(|e| e == "json")).collect();
+        let all: Vec<PathBuf> = all.map(|e| e.path()).collect();
+        let json = |p: &&PathBuf| p.extension().is_some_and(|e| e == "json");
+        let whole: Vec<&PathBuf> = all.iter().filter(json).collect();
         // Browsers make the file first and write it later.
-        let written = |file: &PathBuf| {
+        let written = |file: &Path| {
             let text = std::fs::read(file).expect("a file");
             serde_json::from_slice::<Value>(&text).is_ok()
         };
@@ -29,7 +33,7 @@ fn downloaded(browser: &Browser, to: &Path) -> PathBuf {
             std::fs::rename(file, to).expect("moved");
             return to.to_owned();
         }
-        assert!(begun.elapsed().as_secs() < 60, "no file comes: {whole:?}");
+        assert!(begun.elapsed() < PATIENCE, "no file comes: {all:?}");
         std::thread::sleep(std::time::Duration::from_millis(50));
     }
 }
@@ -152,8 +156,7 @@ fn an_assessor_fills_the_form() {
     go(&browser, "end");
     let told = browser.run("return document.getElementById('summary').textContent");
     assert_eq!(told, json!("All questions are answered. Thank you."));
-    browser.click("#save");
-    let file = downloaded(&browser, &desk.path("saved.json"));
+    let file = save(&browser, &desk.path("saved.json"));
     let answers = Answers::read(&file, &key).expect("as the form saved it");
     assert_eq!(answers.assessor.name, "A. B\u{e4}r");
     assert_eq!(answers.cases[0].remark, "Grainy \u{1f600} \"so\"");
@@ -189,8 +192,7 @@ fn an_assessor_fills_the_form() {
         assert_eq!(checked(&browser, "image-1"), expected);
     }
     go(&browser, "end");
-    browser.click("#save");
-    let again = downloaded(&browser, &desk.path("again.json"));
+    let again = save(&browser, &desk.path("again.json"));
     let again = Answers::read(&again, &key).expect("as the form saved it");
     assert_eq!((again.response, again.cases), (answers.response, answers.cases));
 }

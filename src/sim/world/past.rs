@@ -29,6 +29,8 @@ impl Past {
             Some(kept) => (Some(kept.instances), Some(kept.fields)),
             None => (None, None),
         };
+        // The rows of a first image may have been written just now.
+        commands.barrier(Stage::Transfer, Stage::Transfer);
         let past = Self {
             instances: copy(commands, "instances before", &geometry.instances, instances)?,
             fields: copy(commands, "fields before", &geometry.fields, fields)?,
