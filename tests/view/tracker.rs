@@ -26,8 +26,8 @@ fn open(timeout: &str, more: &[&str]) -> Option<(Desk, SocketAddr)> {
     Some((desk, address))
 }
 
-/// The first image at the scene's own quality, 400 pixels high, that arrives with the pose `matrix`: images sent
-/// during movement may be smaller.
+/// The next image of the scene's own size, 400 pixels high, that arrives with the pose `matrix`: images sent during
+/// movement may be smaller, or as large and coarser.
 fn image_at(client: &mut Client, matrix: [f32; 12]) -> insonify::igtl::image::Image {
     loop {
         let pose = client.receive_kind("TRANSFORM");
@@ -62,9 +62,8 @@ fn a_tracker_moves_the_probe_and_sees_what_the_window_shows() {
     assert!(apart(&moved.values, &seen.values) > 4.0);
     client.transform("Probe", home);
     desk.wait_for("the image to come back", |d| difference(&d.grab(IMAGE), &still) < 1.5);
-    let back = image_at(&mut client, home);
-    // Between frames only electronic noise differs.
-    assert!(apart(&back.values, &seen.values) < 1.5);
+    // The scene's own quality comes last; between frames of it only electronic noise differs.
+    while apart(&image_at(&mut client, home).values, &seen.values) > 1.5 {}
     desk.quit();
 }
 
