@@ -94,7 +94,7 @@ fn a_volume_is_moved_turned_and_put_back_by_the_pointer_and_saved() {
         desk.hold_control(Key::Letter('s'));
         desk.wait_for("it to be saved", |d| place(d) != DAffine3::IDENTITY);
         let (scale, turn, shift) = place(&desk).to_scale_rotation_translation();
-        let [scaled, turned] = [(scale.x - 1.0).abs() > 0.01, turn.to_axis_angle().1 > 0.01];
+        let [scaled, turned] = [(scale.x - 1.0).abs() > 1e-9, turn.to_axis_angle().1 > 0.01];
         assert_eq!([scaled, turned], [name == "scale", name == "turn"], "{name} {scale} {turn}");
         // Along the plane only.
         assert!(shift.y.abs() < 1e-9, "{name} {shift}");
