@@ -29,8 +29,9 @@ void follow(inout Path path, inout Media media) {
     float time_end = frame.depth / frame.speed;
     uint limit = 64u + frame.max_interactions;
     bool fresh = true;
-    // True if no sound begins here, or nothing is transmitted at a surface.
-    bool lost = path.weight <= 0.0;
+    // Below zero if no sound begins here, or nothing was transmitted at a surface. A variable of its own for that is more
+    // than LLVM 19 can carry around a ray query for vectors of four: it ends the process on `shadow_query`.
+    if (path.weight <= 0.0) path.weight = -1.0;
     // True while the first of two coincident surfaces has been found and the ray searches for the other.
     bool pairing = false;
     Met first = surface_met(Hit(0.0, NONE, NONE, 0.0, 0.0));
@@ -42,7 +43,7 @@ void follow(inout Path path, inout Media media) {
         // Around the mask sound travels at the speed assumed by the recording.
         Medium way = t1;
         if (!heard) way.speed = frame.speed;
-        bool ends = lost || path.crossings >= limit || is_over(path);
+        bool ends = path.weight < 0.0 || path.crossings >= limit || is_over(path);
         if (!pairing && (fresh || ends)) begin_way(path, before, way, heard, ends);
         fresh = false;
         float t_end = (time_end - path.time) * way.speed;
@@ -103,8 +104,7 @@ void follow(inout Path path, inout Media media) {
         } else {
             path.interactions += 1u;
             float transmitted = pass(path, here, t1, t2);
-            path.weight *= transmitted;
-            lost = transmitted <= 0.0;
+            path.weight = transmitted <= 0.0 ? -1.0 : path.weight * transmitted;
         }
         copy_media(media, after);
     }
