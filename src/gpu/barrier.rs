@@ -10,6 +10,20 @@ use std::collections::HashMap;
 
 use ash::vk;
 
+/// Stages of the pipeline, and the accesses there.
+pub(crate) type Masks = (vk::PipelineStageFlags, vk::AccessFlags);
+
+/// All work on the device but the window's. Masks of several [`Stage`]s must not be united: a barrier's accesses are
+/// meant at each of its stages, and those of builds at dispatches are refused where ray queries are off
+/// (VUID-vkCmdPipelineBarrier-srcAccessMask-06257). These two accesses stand for all that each stage may do.
+pub(crate) fn all_work(accel: bool) -> Masks {
+    let mut stages = vk::PipelineStageFlags::COMPUTE_SHADER | vk::PipelineStageFlags::TRANSFER;
+    if accel {
+        stages |= vk::PipelineStageFlags::ACCELERATION_STRUCTURE_BUILD_KHR;
+    }
+    (stages, vk::AccessFlags::MEMORY_READ | vk::AccessFlags::MEMORY_WRITE)
+}
+
 /// A kind of work on the device, for [`super::Commands::barrier`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
@@ -30,11 +44,7 @@ impl Stage {
 
     /// Stage and access masks; `accel` and `ray_query` are true where the device has enabled them, since
     /// Vulkan refuses flags of features that are off.
-    pub(crate) fn masks(
-        self,
-        accel: bool,
-        ray_query: bool,
-    ) -> (vk::PipelineStageFlags, vk::AccessFlags) {
+    pub(crate) fn masks(self, accel: bool, ray_query: bool) -> Masks {
         use vk::{AccessFlags as Access, PipelineStageFlags as Pipeline};
         match self {
             Self::Compute => {
@@ -120,7 +130,28 @@ impl HazardCheck {
 
 #[cfg(test)]
 mod tests {
-    use super::{HazardCheck, Stage};
+    use ash::vk;
+
+    use super::{HazardCheck, Stage, all_work};
+
+    /// What newer layers check, also where the installed ones do not: structures are read by shaders only where ray
+    /// queries are on, and no stage or access of builds is named where structures are off.
+    #[test]
+    fn masks_are_of_features_that_are_on() {
+        use vk::{AccessFlags as Access, PipelineStageFlags as Pipeline};
+        let structures =
+            Access::ACCELERATION_STRUCTURE_READ_KHR | Access::ACCELERATION_STRUCTURE_WRITE_KHR;
+        let all = [Stage::Compute, Stage::Transfer, Stage::Build, Stage::Host];
+        for (accel, ray_query) in [(false, false), (true, false), (true, true)] {
+            let single = all.map(|stage| stage.masks(accel, ray_query));
+            for (stages, access) in single.into_iter().chain([all_work(accel)]) {
+                assert!(accel || !stages.contains(Pipeline::ACCELERATION_STRUCTURE_BUILD_KHR));
+                assert!(accel || !access.intersects(structures));
+                let shader = stages.contains(Pipeline::COMPUTE_SHADER);
+                assert!(ray_query || !shader || !access.intersects(structures), "{stages:?}");
+            }
+        }
+    }
 
     #[test]
     fn dispatches_need_a_barrier_when_one_of_them_writes() {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::barrier::Stage;
+use super::barrier::{self, Stage};
 use super::descriptors;
 use super::device::Device;
 use super::error::GpuError;
@@ -66,8 +66,8 @@ impl<'a> Commands<'a> {
 
     /// Waits for everything submitted before.
     fn follow(&self) {
-        let work = [Stage::Compute, Stage::Transfer, Stage::Build];
-        self.barrier_between(&work, &work);
+        let (stages, access) = barrier::all_work(self.device().supports_acceleration_structure());
+        self.memory_barrier((stages, access), (stages, access));
     }
 
     /// The device of the commands.
@@ -94,39 +94,19 @@ impl<'a> Commands<'a> {
     /// anything of kind `to` recorded later starts.
     pub fn barrier(&mut self, from: Stage, to: Stage) {
         self.slot.hazards.barrier(from, to);
-        self.barrier_between(&[from], &[to]);
+        let device = self.device();
+        let (accel, ray_query) =
+            (device.supports_acceleration_structure(), device.supports_ray_query());
+        self.memory_barrier(from.masks(accel, ray_query), to.masks(accel, ray_query));
     }
 
-    fn barrier_between(&self, from: &[Stage], to: &[Stage]) {
-        let device = self.device();
-        let masks = |stages: &[Stage]| {
-            stages.iter().fold(
-                (vk::PipelineStageFlags::empty(), vk::AccessFlags::empty()),
-                |(pipeline, access), stage| {
-                    let masks = stage.masks(
-                        device.supports_acceleration_structure(),
-                        device.supports_ray_query(),
-                    );
-                    (pipeline | masks.0, access | masks.1)
-                },
-            )
-        };
-        let (from_stages, from_access) = masks(from);
-        let (to_stages, to_access) = masks(to);
-        let memory =
-            [vk::MemoryBarrier::default().src_access_mask(from_access).dst_access_mask(to_access)];
+    /// A global barrier between two sets of stages, each with its accesses.
+    fn memory_barrier(&self, from: barrier::Masks, to: barrier::Masks) {
+        let memory = [vk::MemoryBarrier::default().src_access_mask(from.1).dst_access_mask(to.1)];
+        let none = vk::DependencyFlags::empty();
+        let raw = &self.device().raw;
         // SAFETY: the buffer is being recorded; the flags belong to enabled features.
-        unsafe {
-            device.raw.cmd_pipeline_barrier(
-                self.raw(),
-                from_stages,
-                to_stages,
-                vk::DependencyFlags::empty(),
-                &memory,
-                &[],
-                &[],
-            );
-        }
+        unsafe { raw.cmd_pipeline_barrier(self.raw(), from.0, to.0, none, &memory, &[], &[]) };
     }
 
     /// Stops asking from here on whether the submission is still wanted: see [`super::Frames::abandon_when`].
