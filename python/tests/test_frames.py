@@ -1,8 +1,11 @@
 """Frames: what is in them, equal to the command line's, and what misuse leads to."""
 
+import re
 import subprocess
+import sys
 import threading
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -371,6 +374,16 @@ def test_nothing_but_the_c_library_is_linked():
         pytest.skip("skipped: no cargo")
     crates = {line.split()[0] for line in tree.stdout.splitlines() if line}
     assert "ash" in crates and not crates & {"libudev-sys", "gilrs", "winit", "egui"}
+
+
+def test_the_module_needs_no_library_of_python():
+    """The interpreter that loads it has Python's functions: a library would tie it to one version, and to its
+    development files."""
+    module = Path(insonify._insonify.__file__).read_bytes()
+    assert module.startswith(b"\x7fELF") or not sys.platform.startswith("linux")
+    # Names of needed libraries stand in the table of strings.
+    assert b"libc.so" in module or not sys.platform.startswith("linux")
+    assert not re.search(rb"\0libpython[0-9.]*(so|dylib)", module)
 
 
 def test_the_stubs_say_what_there_is():
