@@ -50,6 +50,7 @@ mod transfer;
 mod workgroup;
 
 pub use adapter::{AdapterKind, DeviceInfo, list_devices};
+pub use ahead::{compile_standard_input, set_compiler, try_kernel};
 pub use barrier::Stage;
 pub use blas::{Blas, BlasInput, BlasOptions};
 pub use build_times::{BuildTimes, RefitTimes, build_times, refit_times};

@@ -1,5 +1,5 @@
 //! Runs single kernels against their f64 twins:
-//! `cargo run --release --bin kernels -- list | run NAME [--input DIR] [--output DIR] | check`.
+//! `cargo run --release --bin kernels -- list | run NAME [--input DIR] [--output DIR] | check | compile`.
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -7,8 +7,10 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use clap::{Parser, Subcommand, ValueEnum};
-use insonify::gpu::{Device, DeviceOptions, Kernel, prepare_process};
+use insonify::gpu::{self, Device, DeviceOptions, Kernel, prepare_process};
 use insonify::output;
+use insonify::sim::layout::{ROLE_BRANCHES, ROLE_MAIN, ROLE_WHOLE};
+use insonify::sim::rounds::Round;
 use insonify::sim::shaders::Library;
 use insonify_tools::harness::{self, Case, SUBJECTS, Size, Subject, dump};
 use miette::{Context, IntoDiagnostic, Result, miette};
@@ -49,6 +51,9 @@ enum Command {
     },
     /// Runs every kernel on every case; fails where one differs from its twin.
     Check,
+    /// Compiles every kernel and variant, each in a process of its own; fails where the driver's compiler ends its
+    /// process. Other widths of Mesa's vectors: LP_NATIVE_VECTOR_WIDTH, with a MESA_SHADER_CACHE_DIR of its own.
+    Compile,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -85,6 +90,7 @@ fn main() -> Result<ExitCode> {
             run(&device, &library, subject, size, input.as_deref(), output.as_deref())?
         }
         Command::Check => check(&device, &library)?,
+        Command::Compile => compile(&device, &library),
     };
     let messages = device.validation_messages();
     for message in &messages {
@@ -189,4 +195,33 @@ fn check(device: &Arc<Device>, library: &Library) -> Result<bool> {
         }
     }
     Ok(passed)
+}
+
+fn compile(device: &Arc<Device>, library: &Library) -> bool {
+    let mut passed = true;
+    for stem in library.stems() {
+        let roles: &[u32] = match stem.starts_with("trace_") {
+            true => &[ROLE_WHOLE, ROLE_MAIN, ROLE_BRANCHES],
+            false => &[ROLE_WHOLE],
+        };
+        for &role in roles {
+            let constants = Round::constants(role);
+            let constants = if roles.len() > 1 { &constants[..] } else { &[] };
+            if stem.ends_with("_query") && !device.supports_ray_query() {
+                output::line(format_args!("{stem}: not compiled, the device has no ray query"));
+                continue;
+            }
+            let start = Instant::now();
+            let result = gpu::try_kernel(device, stem, library.words(stem), constants);
+            let seconds = start.elapsed().as_secs_f64();
+            let name = if roles.len() > 1 { format!("{stem} {role}") } else { stem.to_owned() };
+            match &result {
+                Ok(true) => output::line(format_args!("{name:<20} {seconds:6.2} s")),
+                Ok(false) => output::line(format_args!("{name:<20} WRONG: refused")),
+                Err(error) => output::line(format_args!("{name:<20} WRONG: {error}")),
+            }
+            passed &= matches!(result, Ok(true));
+        }
+    }
+    passed
 }

@@ -10,12 +10,23 @@ Units: mm, microseconds, MHz, dB; times of a scene in seconds. docs/python.md ha
 """
 
 import os as _os
+import sys as _sys
 
 from . import _insonify
 
 # Mesa's software driver reads them when the first device is opened.
 for _name, _value in _insonify.driver_environment():
     _os.environ[_name] = _os.fspath(_value)
+
+# A fault of a driver's compiler shall end a process of its own and not this one. An application that embeds Python may
+# name itself as the interpreter, and would only open another window.
+if _os.path.basename(_sys.executable or "").lower().startswith("python"):
+    _insonify.set_compiler(_sys.executable, ["-c", f"""
+import sys
+sys.path.insert(0, {_os.path.dirname(_os.path.dirname(_os.path.abspath(__file__)))!r})
+from insonify import _insonify
+sys.exit(_insonify.compile_standard_input())
+"""])
 
 from ._insonify import Frame, InsonifyError, Scene, SceneError, devices  # noqa: E402
 from .datasets import make_dataset  # noqa: E402

@@ -59,6 +59,12 @@ def save(
 def driver_environment() -> list[tuple[str, str]]:
     """Variables that make Mesa's software driver compile in a third of the time; import sets them."""
 
+def set_compiler(program: str, arguments: list[str]) -> None:
+    """Names a program that compiles kernels in a process of its own, by compile_standard_input; import does."""
+
+def compile_standard_input() -> int:
+    """Compiles the kernel that standard input describes; returns the exit code."""
+
 class Scene:
     """What is imaged: anatomy, tissues, probe and every setting of the manual (docs/scenes.md).
 

@@ -49,6 +49,19 @@ fn driver_environment() -> Vec<(&'static str, std::ffi::OsString)> {
     gpu::driver_environment()
 }
 
+/// Names the interpreter, and its arguments, that compiles kernels in a process of its own by calling
+/// `compile_standard_input`: a fault of a driver's compiler then is an exception here.
+#[pyfunction]
+fn set_compiler(program: std::path::PathBuf, arguments: Vec<std::ffi::OsString>) {
+    gpu::set_compiler(program, arguments);
+}
+
+/// Compiles the kernel that standard input describes; returns the exit code.
+#[pyfunction]
+fn compile_standard_input(py: Python<'_>) -> u8 {
+    py.detach(gpu::compile_standard_input)
+}
+
 #[pymodule]
 fn _insonify(module: &Bound<'_, PyModule>) -> PyResult<()> {
     let py = module.py();
@@ -61,5 +74,7 @@ fn _insonify(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(dataset::make_dataset, module)?)?;
     module.add_function(wrap_pyfunction!(save::save, module)?)?;
     module.add_function(wrap_pyfunction!(devices, module)?)?;
+    module.add_function(wrap_pyfunction!(set_compiler, module)?)?;
+    module.add_function(wrap_pyfunction!(compile_standard_input, module)?)?;
     module.add_function(wrap_pyfunction!(driver_environment, module)?)
 }

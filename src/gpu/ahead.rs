@@ -3,42 +3,218 @@
 //! llvmpipe has one queue, which compiles kernel after kernel, each when it is first dispatched. A dispatch
 //! of no groups compiles as well, on any device, and Mesa keeps the result in its folder. So each new kernel
 //! is dispatched on a device of its own, beside others, and the device that asked finds it in the folder.
+//!
+//! Where the program can be started as a compiler ([`super::prepare_process`]), that device is in a process of its
+//! own: LLVM meets code that it cannot translate by ending the process, which then is not the user's, and an error says
+//! the kernel and the remedy. Drivers of GPUs compile in `vkCreateComputePipelines` and need not keep what they compile:
+//! there a process of its own would double the wait, so they compile in this one.
 
-use std::sync::Arc;
+use std::ffi::OsString;
+use std::io::{Read, Write};
+use std::path::PathBuf;
+use std::process::{Command, ExitStatus, Stdio};
+use std::sync::{Arc, OnceLock};
 
-use super::commands::Binding;
+use serde::{Deserialize, Serialize};
+
+use super::commands::{Binding, Commands};
 use super::device::{Device, DeviceOptions};
 use super::error::GpuError;
+use super::image::{AddressMode, Filter, Image, ImageDim, ImageFormat, Sampler};
 use super::kernel::Kernel;
-use super::memory::BufferKind;
-use super::reflect::BindingKind;
+use super::memory::{Buffer, BufferKind};
+use super::reflect::{BindingInfo, BindingKind};
+use super::tlas::Tlas;
+use super::{Stage, kept, process};
 
-/// Compiles a kernel on a device of its own. An error here occurs again, and is reported, where the kernel is
-/// needed.
-pub(super) fn compile(
-    device: &str,
+/// The argument with which a program of ours is started as a compiler.
+pub(super) const COMPILE: &str = "--compile-kernel";
+
+/// The first line of a compiler's output: who else is started, an older or newer program say, does not write it.
+const GREETING: &str = "insonify compiles a kernel\n";
+
+/// The program, and its arguments, that compiles a [`Job`] given on its standard input.
+static COMPILER: OnceLock<(PathBuf, Vec<OsString>)> = OnceLock::new();
+
+/// Names the program that compiles kernels in a process of its own: with these arguments it calls
+/// [`compile_standard_input`]. Only the first call counts.
+pub fn set_compiler(program: PathBuf, arguments: Vec<OsString>) {
+    let _ = COMPILER.set((program, arguments));
+}
+
+/// Returns whether kernels are compiled in a process of their own.
+pub(super) fn has_compiler() -> bool {
+    COMPILER.get().is_some()
+}
+
+/// A kernel to be compiled for a device.
+#[derive(Serialize, Deserialize)]
+pub(super) struct Job {
+    /// Name of the device.
+    pub(super) device: String,
+    /// Name of the kernel.
+    pub(super) kernel: String,
+    pub(super) spirv: Vec<u32>,
+    pub(super) specialization: Vec<(u32, u32)>,
+}
+
+/// End of a driver's compiler.
+#[derive(Clone, Debug)]
+pub(crate) struct Died {
+    /// The way in which the process ended: "signal: 6 (SIGABRT)".
+    pub(crate) status: ExitStatus,
+    /// Its last words; may be empty.
+    pub(crate) words: String,
+}
+
+impl Died {
+    /// The error of a kernel on a device.
+    pub(crate) fn of(self, device: &Device, kernel: &str) -> GpuError {
+        let [width, _] = kept::MESA_VARIABLES.map(|name| std::env::var(name).ok());
+        GpuError::Compiler {
+            device: device.name().into(),
+            kernel: kernel.into(),
+            status: self.status,
+            words: if self.words.is_empty() { String::new() } else { format!(": {}", self.words) },
+            width: width.unwrap_or("the processor's".into()),
+        }
+    }
+}
+
+/// Compiles a kernel, in a process of its own where there is a program for that. An error of Vulkan occurs again, and is
+/// reported, where the kernel is needed.
+pub(super) fn compile(job: &Job) -> Result<(), Died> {
+    match COMPILER.get().and_then(|compiler| compile_apart(compiler, job)) {
+        Some(compiled) => compiled.map(|_| ()),
+        None => {
+            let _ = compile_here(job);
+            Ok(())
+        }
+    }
+}
+
+/// Compiles a kernel in a process of its own. Returns whether the driver took it.
+///
+/// # Errors
+/// The driver's compiler ended its process.
+///
+/// # Panics
+/// When this program cannot be started as a compiler ([`super::prepare_process`]).
+pub fn try_kernel(
+    device: &Device,
     name: &str,
     spirv: &[u32],
     specialization: &[(u32, u32)],
-) -> Result<(), GpuError> {
-    let device =
-        Device::new(&DeviceOptions { selector: Some(device.into()), ..DeviceOptions::default() })?;
-    let kernel = Kernel::when_needed(&device, name, spirv, specialization)?;
+) -> Result<bool, GpuError> {
+    let compiler = COMPILER.get().expect("prepare_process was called");
+    let job = Job {
+        device: device.name().into(),
+        kernel: name.into(),
+        spirv: spirv.into(),
+        specialization: specialization.into(),
+    };
+    let compiled = compile_apart(compiler, &job).expect("this program is a compiler");
+    compiled.map_err(|died| died.of(device, name))
+}
+
+/// Returns whether Vulkan took the kernel; `None` where the program cannot be started as a compiler.
+fn compile_apart(compiler: &(PathBuf, Vec<OsString>), job: &Job) -> Option<Result<bool, Died>> {
+    let mut command = Command::new(&compiler.0);
+    command.args(&compiler.1).env_remove("INSONIFY_VALIDATE");
+    command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().ok()?;
+    let text = serde_json::to_vec(job).ok()?;
+    // A compiler that does not read is told by its greeting.
+    let _ = child.stdin.take()?.write_all(&text);
+    let out = child.wait_with_output().ok()?;
+    if !out.stdout.starts_with(GREETING.as_bytes()) {
+        return None;
+    }
+    // 1: an error of Vulkan.
+    if let Some(code @ (0 | 1)) = out.status.code() {
+        return Some(Ok(code == 0));
+    }
+    let words = String::from_utf8_lossy(&out.stderr);
+    let words = words.lines().find(|line| line.contains("ERROR")).or(words.lines().last());
+    Some(Err(Died { status: out.status, words: words.unwrap_or_default().trim().to_owned() }))
+}
+
+/// Compiles the kernel that standard input describes, which another process of this program has started it for; the
+/// driver keeps the result. Returns the exit code.
+pub fn compile_standard_input() -> u8 {
+    process::without_core_file();
+    let mut out = std::io::stdout();
+    let greeted = out.write_all(GREETING.as_bytes()).and_then(|()| out.flush());
+    let mut text = Vec::new();
+    let read = greeted.and_then(|()| std::io::stdin().read_to_end(&mut text));
+    let job = read.ok().and_then(|_| serde_json::from_slice(&text).ok());
+    let done = job.is_some_and(|job| compile_here(&job).is_ok());
+    u8::from(!done)
+}
+
+fn compile_here(job: &Job) -> Result<(), GpuError> {
+    let options = DeviceOptions { selector: Some(job.device.clone()), ..DeviceOptions::default() };
+    let device = Device::new(&options)?;
+    let kernel = Kernel::when_needed(&device, &job.kernel, &job.spirv, &job.specialization)?;
     dispatch_nothing(&device, &kernel)
 }
 
-/// Makes the device compile a kernel, unless that binds more than storage buffers.
-fn dispatch_nothing(device: &Arc<Device>, kernel: &Kernel) -> Result<(), GpuError> {
-    if (kernel.bindings().iter()).any(|b| b.kind != BindingKind::StorageBuffer) {
-        return Ok(());
+/// An object that a kernel can bind, as small as possible: nobody reads it.
+enum Nothing {
+    Buffer(Buffer),
+    Image(Image),
+    Sampled(Image, Sampler),
+    Sampler(Sampler),
+    Tlas(Box<Tlas>),
+}
+
+impl Nothing {
+    fn new(
+        device: &Arc<Device>,
+        commands: &mut Commands<'_>,
+        binding: &BindingInfo,
+    ) -> Result<Self, GpuError> {
+        let image = || {
+            let dim = if binding.image_dimensions == 3 { ImageDim::D3 } else { ImageDim::D2 };
+            Image::new(device, "nothing", dim, [1; 3], ImageFormat::R32Float)
+        };
+        let sampler = || Sampler::new(device, "nothing", Filter::Nearest, AddressMode::ClampToEdge);
+        Ok(match binding.kind {
+            BindingKind::StorageBuffer | BindingKind::UniformBuffer => {
+                Self::Buffer(device.buffer("nothing", 4, BufferKind::Storage)?)
+            }
+            BindingKind::StorageImage | BindingKind::SampledImage => Self::Image(image()?),
+            BindingKind::ImageAndSampler => Self::Sampled(image()?, sampler()?),
+            BindingKind::Sampler => Self::Sampler(sampler()?),
+            BindingKind::AccelerationStructure => {
+                let mut tlas = Tlas::new(device, "nothing", 1)?;
+                tlas.build(commands, &[])?;
+                commands.barrier(Stage::Build, Stage::Compute);
+                Self::Tlas(Box::new(tlas))
+            }
+        })
     }
-    // As small as possible: nobody reads them.
-    let nothing = || device.buffer("nothing", 4, BufferKind::Storage);
-    let made: Result<Vec<_>, _> = kernel.bindings().iter().map(|_| nothing()).collect();
-    let made = made?;
-    let bindings: Vec<_> = made.iter().map(Binding::Buffer).collect();
+
+    fn binding(&self) -> Binding<'_> {
+        match self {
+            Self::Buffer(buffer) => Binding::Buffer(buffer),
+            Self::Image(image) => Binding::Image(image),
+            Self::Sampled(image, sampler) => Binding::Sampled(image, sampler),
+            Self::Sampler(sampler) => Binding::Sampler(sampler),
+            Self::Tlas(tlas) => Binding::Tlas(tlas),
+        }
+    }
+}
+
+/// Makes the device compile a kernel.
+fn dispatch_nothing(device: &Arc<Device>, kernel: &Kernel) -> Result<(), GpuError> {
     let push = vec![0; kernel.push_constant_bytes()];
-    device.once(|commands| commands.dispatch_groups(kernel, [0; 3], &push, &bindings))
+    device.once(|commands| {
+        let made = kernel.bindings().iter().map(|b| Nothing::new(device, commands, b));
+        let made = made.collect::<Result<Vec<_>, _>>()?;
+        let bindings: Vec<_> = made.iter().map(Nothing::binding).collect();
+        commands.dispatch_groups(kernel, [0; 3], &push, &bindings)
+    })
 }
 
 #[cfg(test)]
@@ -51,14 +227,64 @@ mod tests {
         let words = |bytes: &[u8]| -> Vec<u32> { bytemuck::pod_collect_to_vec(bytes) };
         let add = words(include_bytes!("../../tests/gpu/add.spv"));
         let sample = words(include_bytes!("../../tests/gpu/sample.spv"));
+        let nearest = words(include_bytes!("../../tests/gpu/nearest.spv"));
         let device = lone_test_device();
-        for spirv in [&add, &sample] {
-            let kernel = Kernel::when_needed(&device, "it", spirv, &[]).unwrap();
+        for spirv in [&add, &sample, &nearest] {
+            let kernel = Kernel::when_needed(&device, "it", spirv, &[]);
+            // The last one needs ray queries.
+            let Ok(kernel) = kernel else { continue };
             dispatch_nothing(&device, &kernel).unwrap();
         }
         assert_eq!(device.validation_messages(), [""; 0]);
-        compile(device.name(), "add", &add, &[(1, 3)]).unwrap();
-        assert!(compile(device.name(), "add", &add, &[(9, 3)]).is_err());
-        assert!(compile("no such device", "add", &add, &[]).is_err());
+        let job = |device: &str, constant| Job {
+            device: device.into(),
+            kernel: "add".into(),
+            spirv: add.clone(),
+            specialization: vec![(constant, 3)],
+        };
+        compile_here(&job(device.name(), 1)).unwrap();
+        assert!(compile_here(&job(device.name(), 9)).is_err());
+        assert!(compile_here(&job("no such device", 1)).is_err());
+    }
+
+    #[test]
+    fn a_program_that_is_no_compiler_is_not_waited_for() {
+        let job = Job {
+            device: "it".into(),
+            kernel: "add".into(),
+            spirv: vec![0; 1 << 16],
+            specialization: vec![],
+        };
+        let here = std::env::current_exe().unwrap();
+        let listing = (here, vec!["--list".into(), "no such test".into()]);
+        assert!(compile_apart(&listing, &job).is_none());
+        assert!(compile_apart(&("no such program".into(), vec![]), &job).is_none());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn the_end_of_a_compiler_is_told() {
+        let job = Job {
+            device: "it".into(),
+            kernel: "add".into(),
+            spirv: vec![0; 64],
+            specialization: vec![],
+        };
+        let compile = |then: &str| {
+            let script = format!("printf '{GREETING}'; cat >/dev/null; {then}");
+            compile_apart(&("sh".into(), vec!["-c".into(), script.into()]), &job)
+        };
+        assert!(matches!(compile("exit 0"), Some(Ok(true))));
+        assert!(matches!(compile("exit 1"), Some(Ok(false))), "the device in use meets the error");
+        let died = compile("echo 'LLVM ERROR: no such copy' >&2; echo more >&2; kill -ABRT $$");
+        let died = died.unwrap().unwrap_err();
+        assert_eq!(died.words, "LLVM ERROR: no such copy");
+        let device = lone_test_device();
+        let text = died.of(&device, "add").to_string();
+        for part in [device.name(), "'add'", "signal: 6", "no such copy", "LP_NATIVE_VECTOR_WIDTH"]
+        {
+            assert!(text.contains(part), "{text}");
+        }
+        assert!(compile("kill -SEGV $$").unwrap().unwrap_err().words.is_empty());
     }
 }

@@ -106,6 +106,22 @@ pub enum GpuError {
         /// The problem.
         problem: String,
     },
+    /// The driver's compiler ended its process on a kernel, which it did in a process of its own.
+    #[error(
+        "the compiler of {device} ended on the kernel '{kernel}' ({status}){words}; this is a fault of the driver or its compiler. Take another width of vectors (LP_NATIVE_VECTOR_WIDTH=256 before the command; now {width}), the other tracer (--tracer bvh, --tracer ray-query), another device (--device; insonify info lists them), or another version of the driver"
+    )]
+    Compiler {
+        /// Name of the device.
+        device: String,
+        /// Name of the kernel.
+        kernel: String,
+        /// The way in which the process ended.
+        status: std::process::ExitStatus,
+        /// Its last words, after a colon; empty without any.
+        words: String,
+        /// Width of vectors that Mesa compiles for, bits, as the environment has it.
+        width: String,
+    },
     /// The bindings of a dispatch do not fit the kernel.
     #[error("kernel '{kernel}', {binding}: {problem}")]
     Binding {

@@ -27,6 +27,10 @@ const MAX_BYTES: u64 = 64 << 20;
 /// Most files kept: one per device and driver version. The oldest are removed first.
 const MAX_FILES: usize = 8;
 
+/// The variables of the environment by which Mesa's driver for the processor compiles: the width of its vectors, and
+/// the folder in which it keeps what it has compiled.
+pub(crate) const MESA_VARIABLES: [&str; 2] = ["LP_NATIVE_VECTOR_WIDTH", "MESA_SHADER_CACHE_DIR"];
+
 /// Length of a wait after which the user is told its reason.
 const PATIENCE: Duration = Duration::from_secs(1);
 
@@ -174,15 +178,19 @@ pub(crate) struct WaitNotice {
     _done: Sender<()>,
 }
 
-/// Name of the file: one per device, driver and driver version.
+/// Name of the file: one per device, driver, driver version, and folder and width with which Mesa compiles for the
+/// processor, since a kernel that has run with others is compiled again.
 fn file_name(properties: &vk::PhysicalDeviceProperties) -> String {
     let hex = |bytes: &[u8]| -> String { bytes.iter().map(|b| format!("{b:02x}")).collect() };
+    let named = MESA_VARIABLES.map(|name| std::env::var_os(name).unwrap_or_default());
+    let of_mesa = named.each_ref().map(|value| value.as_encoded_bytes()).join(&b'\n');
     format!(
-        "{:x}-{:x}-{:x}-{}.bin",
+        "{:x}-{:x}-{:x}-{}-{:x}.bin",
         properties.vendor_id,
         properties.device_id,
         properties.driver_version,
-        hex(&properties.pipeline_cache_uuid)
+        hex(&properties.pipeline_cache_uuid),
+        check_sum(&of_mesa)
     )
 }
 

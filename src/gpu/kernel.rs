@@ -5,7 +5,7 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::device::Device;
-use super::error::{GpuError, during};
+use super::error::GpuError;
 use super::pipelines::Pipeline;
 use super::reflect::BindingInfo;
 
@@ -71,8 +71,7 @@ impl Kernel {
         let (pipeline, device) = (&self.0.pipeline, &self.0.device);
         let waits = !pipeline.is_made();
         let _waiting = waits.then(|| device.kept.patience([pipeline.id]));
-        let what = || format!("creating the pipeline of '{}'", self.name());
-        let made = pipeline.make_once().map_err(|code| during(what())(code))?;
+        let made = pipeline.make_once().map_err(|reason| reason.of(device, self.name()))?;
         pipeline.named.call_once(|| device.set_name(made, self.name()));
         Ok(made)
     }

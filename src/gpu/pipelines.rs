@@ -17,7 +17,7 @@ use super::device::Device;
 use super::error::{GpuError, during};
 use super::reflect::{BindingKind, Reflection, reflect};
 
-/// Size above which a module is compiled on a device of its own, words.
+/// Size above which a module is compiled on a device of its own in this process, words; in another process all are.
 const LARGE_MODULE_WORDS: usize = 1024;
 
 /// Number of pipelines from which on those that nobody uses are destroyed when another is asked for. All scenes that
@@ -61,6 +61,23 @@ enum Made {
     Yes(vk::Pipeline),
     /// Its device ends.
     Never,
+}
+
+/// Reason why a pipeline was not made.
+pub(crate) enum NotMade {
+    Vulkan(vk::Result),
+    /// The driver's compiler ended its process, which is not this one.
+    Compiler(ahead::Died),
+}
+
+impl NotMade {
+    /// The error of a kernel on a device.
+    pub(crate) fn of(self, device: &Device, kernel: &str) -> GpuError {
+        match self {
+            Self::Vulkan(code) => during(format!("creating the pipeline of '{kernel}'"))(code),
+            Self::Compiler(died) => died.of(device, kernel),
+        }
+    }
 }
 
 /// All pipelines of a device.
@@ -113,8 +130,8 @@ impl Pipeline {
         let problem = |problem: String| GpuError::Kernel { kernel: name.into(), problem };
         let reflection = reflect(spirv, specialization).map_err(problem)?;
         check_limits(device, &reflection).map_err(problem)?;
-        let ahead =
-            device.compiles_late() && device.kept.is_new(id) && spirv.len() > LARGE_MODULE_WORDS;
+        let worth_it = ahead::has_compiler() || spirv.len() > LARGE_MODULE_WORDS;
+        let ahead = device.compiles_late() && device.kept.is_new(id) && worth_it;
         let mut pipeline = Self {
             id,
             // spirq returned the name from a NUL-terminated literal.
@@ -189,11 +206,11 @@ impl Pipeline {
 
     /// The pipeline; waits where it is being made, and makes it where nobody does. After an error the next call tries
     /// again.
-    pub(crate) fn make_once(&self) -> Result<vk::Pipeline, vk::Result> {
+    pub(crate) fn make_once(&self) -> Result<vk::Pipeline, NotMade> {
         let mut made = self.made.lock();
         match *made {
             Made::Yes(pipeline) => Ok(pipeline),
-            Made::Never => Err(vk::Result::NOT_READY),
+            Made::Never => Err(NotMade::Vulkan(vk::Result::NOT_READY)),
             Made::NotYet => {
                 let pipeline = self.make()?;
                 *made = Made::Yes(pipeline);
@@ -202,15 +219,21 @@ impl Pipeline {
         }
     }
 
-    fn make(&self) -> Result<vk::Pipeline, vk::Result> {
+    fn make(&self) -> Result<vk::Pipeline, NotMade> {
         if let Some([device, kernel]) = &self.ahead {
-            // An error there occurs here again, from the driver of the device in use.
-            let _ = ahead::compile(device, kernel, &self.spirv, &self.specialization);
+            let job = ahead::Job {
+                device: device.clone(),
+                kernel: kernel.clone(),
+                spirv: self.spirv.clone(),
+                specialization: self.specialization.clone(),
+            };
+            ahead::compile(&job).map_err(NotMade::Compiler)?;
         }
         let info = vk::ShaderModuleCreateInfo::default().code(&self.spirv);
         // SAFETY: the words parsed as SPIR-V; the kernels of this crate are checked by spirv-val.
         // The device is alive: it waits for this before it ends, and after that nothing is made.
-        let module = unsafe { self.raw.create_shader_module(&info, None) }?;
+        let module =
+            unsafe { self.raw.create_shader_module(&info, None) }.map_err(NotMade::Vulkan)?;
         let values: Vec<u32> = self.specialization.iter().map(|&(_, value)| value).collect();
         let entries: Vec<_> = (self.specialization.iter().enumerate())
             .map(|(at, &(id, _))| {
@@ -235,7 +258,7 @@ impl Pipeline {
         let created = unsafe { self.raw.create_compute_pipelines(self.cache, &[info], None) };
         // SAFETY: a pipeline does not need its module any more.
         unsafe { self.raw.destroy_shader_module(module, None) };
-        created.map(|made| made[0]).map_err(|(_, code)| code)
+        created.map(|made| made[0]).map_err(|(_, code)| NotMade::Vulkan(code))
     }
 
     /// Destroys it; waits where it is being made. Work not begun never will be.

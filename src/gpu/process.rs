@@ -4,7 +4,7 @@
 use std::ffi::OsString;
 use std::path::PathBuf;
 
-use super::kept;
+use super::{ahead, kept};
 
 /// Makes llvmpipe, Mesa's driver for the processor, compile kernels for vectors of four: that takes it a third of the
 /// time for vectors of eight, frames take as long within a twentieth, and bits are the same (benches/RESULTS.md).
@@ -14,6 +14,9 @@ use super::kept;
 ///
 /// Limits the number of glibc's heaps, which otherwise grows with the threads: memory that drivers free in them after
 /// compiling is not given back to the system, 25 MB in two threads.
+///
+/// Lets this program be started again as a compiler of kernels, in a process of its own: where that is what this process
+/// was started for, it compiles and ends here.
 ///
 /// To be called first in `main`. Once there are other threads, it does nothing.
 pub fn prepare_process() {
@@ -26,18 +29,35 @@ pub fn prepare_process() {
             // SAFETY: this is the only thread, so that none reads the environment meanwhile.
             unsafe { std::env::set_var(name, value) };
         }
+        if std::env::args_os().nth(1).is_some_and(|first| first == ahead::COMPILE) {
+            std::process::exit(ahead::compile_standard_input().into());
+        }
+        if let Ok(program) = std::env::current_exe() {
+            ahead::set_compiler(program, vec![ahead::COMPILE.into()]);
+        }
     }
 }
 
 /// The variables that [`prepare_process`] sets, with their values; none where one of them is set.
 pub fn driver_environment() -> Vec<(&'static str, OsString)> {
-    const NAMES: [&str; 2] = ["LP_NATIVE_VECTOR_WIDTH", "MESA_SHADER_CACHE_DIR"];
-    let set = NAMES.iter().any(|name| std::env::var_os(name).is_some());
+    let set = kept::MESA_VARIABLES.iter().any(|name| std::env::var_os(name).is_some());
     // Mesa makes no folders above its own.
     let made = |folder: &PathBuf| std::fs::create_dir_all(folder).is_ok();
     match kept::mesa_folder().filter(made) {
-        Some(folder) if !set => NAMES.into_iter().zip(["128".into(), folder.into()]).collect(),
+        Some(folder) if !set => {
+            kept::MESA_VARIABLES.into_iter().zip(["128".into(), folder.into()]).collect()
+        }
         _ => Vec::new(),
+    }
+}
+
+/// Makes the system keep no image of this process where it ends by a signal: somebody expects that.
+pub(super) fn without_core_file() {
+    #[cfg(all(target_os = "linux", target_env = "gnu"))]
+    {
+        let none = libc::rlimit { rlim_cur: 0, rlim_max: 0 };
+        // SAFETY: the structure is alive during the call, which can only fail.
+        unsafe { libc::setrlimit(libc::RLIMIT_CORE, &none) };
     }
 }
 
