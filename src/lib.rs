@@ -29,3 +29,8 @@ pub mod teach;
 #[cfg(feature = "window")]
 pub mod view;
 pub mod volume;
+
+// Tests here skip as those in tests/ do.
+#[cfg(test)]
+#[path = "../tests/common/skip.rs"]
+mod skip;

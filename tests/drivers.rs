@@ -34,8 +34,8 @@ fn second_driver() -> Option<PathBuf> {
 fn on(manifest: Option<&Path>, program: &str) -> Command {
     let mut command = Command::new(program);
     if let Some(manifest) = manifest {
-        command.env_remove("VK_ICD_FILENAMES");
-        command.env("VK_DRIVER_FILES", manifest);
+        // The second name is that of loaders before 1.3.207.
+        command.env("VK_DRIVER_FILES", manifest).env("VK_ICD_FILENAMES", manifest);
     }
     command
 }
@@ -54,7 +54,8 @@ fn picture(manifest: Option<&Path>, scene: &str, folder: &Path, more: &[&str]) -
     let mut command = on(manifest, env!("CARGO_BIN_EXE_insonify"));
     command.arg("render");
     command.arg(root().join(format!("scenes/{scene}.toml")));
-    command.args(["--quality", "standard", "--output"]).arg(&file);
+    // Both drivers have this tracer.
+    command.args(["--tracer", "bvh", "--quality", "standard", "--output"]).arg(&file);
     command.arg("--validate").args(SIZE.iter().flat_map(|size| ["--set", size]));
     command.args(more);
     output_of(&mut command);

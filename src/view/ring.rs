@@ -67,13 +67,13 @@ mod tests {
     use std::time::Instant;
 
     use super::{Ring, SPARE};
-    use crate::gpu::test_device;
+    use crate::gpu::{lone_test_device, test_device};
     use crate::view::model::Cine;
     use crate::view::model::cine::Limit;
 
     #[test]
     fn memory_is_that_of_the_loop_and_is_given_back_with_it() {
-        let device = test_device();
+        let device = lone_test_device();
         let mut ring = Ring::new(&device, "B-mode");
         let frames = 12;
         let mut cine = Cine::new(Limit { frames, bytes: 1 << 30 });
@@ -91,9 +91,11 @@ mod tests {
         cine.clear();
         ring.free([256, 256]).unwrap();
         assert_eq!(ring.images.len(), SPARE);
+        // A driver may give images of one size memory of different sizes, and more than their texels need.
         let left = device.memory().current - before;
-        let each = (full - before) / (frames as u64 + 1);
-        assert_eq!(left, SPARE as u64 * each);
+        assert!(left >= ring.bytes() && left < (full - before) / 2, "{left} of {}", full - before);
+        drop(ring);
+        assert_eq!(device.memory().current, before);
     }
 
     #[test]

@@ -22,10 +22,14 @@ pub fn with(name: &str, import: &str, packages: &[&str]) -> Option<PathBuf> {
     Some(python)
 }
 
-/// The JSON that a script prints, and what it says on standard error.
+/// The JSON that a script prints, and what it says on standard error. Not that something of a package will not be in a
+/// later version of Python or numpy.
 pub fn run(python: &Path, script: &str, args: &[&str]) -> (Value, String) {
-    let out = Command::new(python).args(["-c", script]).args(args).output();
-    let out = out.expect("Python starts");
+    let mut command = Command::new(python);
+    for warning in ["DeprecationWarning", "PendingDeprecationWarning", "FutureWarning"] {
+        command.args(["-W", &format!("ignore::{warning}")]);
+    }
+    let out = command.args(["-c", script]).args(args).output().expect("Python starts");
     let said = String::from_utf8_lossy(&out.stderr).into_owned();
     assert!(out.status.success(), "{said}");
     (serde_json::from_slice(&out.stdout).expect("JSON"), said)

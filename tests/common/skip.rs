@@ -1,5 +1,7 @@
 //! The skipping of a test on a machine that lacks something it needs.
 
+use std::io::Write as _;
+
 /// Kind of the missing thing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Lacking {
@@ -19,6 +21,12 @@ pub fn skip(lacking: Lacking, why: &str) {
     let rule = std::env::var("INSONIFY_NO_SKIP").ok();
     assert!(!is_forbidden(lacking, rule.as_deref()), "not run: {why} (INSONIFY_NO_SKIP)");
     println!("skipped: {why}");
+    // The end of tools/test.sh says it.
+    if let Some(list) = std::env::var_os("INSONIFY_SKIPPED") {
+        let list = std::fs::File::options().append(true).create(true).open(list);
+        let written = list.and_then(|mut list| list.write_all(format!("{why}\n").as_bytes()));
+        written.expect("the list of skipped tests");
+    }
 }
 
 /// Returns whether a rule forbids the skip.

@@ -1,6 +1,7 @@
 use std::path::{Path, PathBuf};
 
 use super::{Mp4, Mp4Error, even_rgb, rate};
+use crate::skip::{Lacking, skip};
 
 /// A stand-in for `ffmpeg`: a script that does `what`, where `$out` is the file that it is told to write.
 #[cfg(unix)]
@@ -98,8 +99,7 @@ fn frames_are_made_even_and_none_is_left_out() {
 #[test]
 fn ffmpeg_makes_an_mp4_of_them() {
     if Mp4::check().is_err() {
-        println!("skipped: no ffmpeg on the PATH");
-        return;
+        return skip(Lacking::Tool, "no ffmpeg on the PATH (./tools/setup.sh installs it)");
     }
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.mp4");

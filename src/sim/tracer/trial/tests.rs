@@ -1,16 +1,13 @@
 //! The trial on the software driver's ray query, and on results that are wrong.
 
 use bytemuck::Zeroable;
-use skip::{Lacking, skip};
 
 use super::{RayHit, Trial, agree, id};
 use crate::gpu::test_device;
 use crate::scene::Scene;
 use crate::sim::layout::NONE;
 use crate::sim::shaders::Library;
-
-#[path = "../../../../tests/common/skip.rs"]
-mod skip;
+use crate::skip::{Lacking, skip};
 
 fn hit(instance: u32, t: f32) -> RayHit {
     RayHit { instance, t, ..RayHit::zeroed() }
