@@ -8,6 +8,12 @@ mode=${1:-test}
 
 say() { printf 'setup: %s\n' "$*" >&2; }
 
+# Says what could not be had, also at the end of tools/test.sh: it is not this system's lack, but a source out of reach.
+lacks() {
+  say "$*"
+  [ -z "${INSONIFY_LACKS:-}" ] || printf '%s\n' "$*" >>"$INSONIFY_LACKS"
+}
+
 manual() {
   say "$1"
   say "install by hand, then run this again:"
@@ -58,6 +64,12 @@ if [ "$mode" != run ]; then
 fi
 driver=
 has_driver || driver=mesa-vulkan-drivers
+# A driver that is there stays as it is; the tests' is to have ray query, which Mesa's for the processor has since 24.1.
+mesa=$(dpkg-query -W -f '${Version}' mesa-vulkan-drivers 2>/dev/null || true)
+if [ "$mode" != run ] && [ -n "$mesa" ] && dpkg --compare-versions "$mesa" lt 24.1; then
+  say "mesa-vulkan-drivers $mesa has no ray query: tests of it will fail. On Debian 12, with bookworm-backports among apt's"
+  say "sources: apt-get install -t bookworm-backports mesa-vulkan-drivers"
+fi
 # Root's own apt-get, or sudo's where that asks nothing.
 apt_quietly() {
   local as=()
@@ -70,6 +82,10 @@ knows() {
   apt-cache show "$1" >/dev/null 2>&1 && return
   grep -qs '^ID=debian' /etc/os-release && apt_quietly update -qq && apt-cache show "$1" >/dev/null 2>&1
 }
+# Debian has each of these packages: there a missing one is a source out of reach.
+missing() {
+  if grep -qs '^ID=debian' /etc/os-release; then lacks "$*"; else say "$*"; fi
+}
 # A second driver shows what the first one forgives: SwiftShader, two files out of Debian's package
 # chromium-common, in target/second-driver, where only the tests look. Nothing is installed.
 second_driver() {
@@ -77,7 +93,7 @@ second_driver() {
   into=$(cd "$(dirname "$0")/.." && pwd)/target/second-driver
   [ -s "$into/vk_swiftshader_icd.json" ] && return
   if ! command -v dpkg-deb >/dev/null || ! knows "$package"; then
-    say "no package $package here (Debian has it): tests on a second driver are skipped"
+    missing "no package $package (Debian has it): tests on a second driver are skipped"
     return
   fi
   say "unpacking SwiftShader, the tests' second driver, from $package into $into"
@@ -85,27 +101,31 @@ second_driver() {
   mkdir -p "$into/package"
   if ! (cd "$into/package" && apt-get download -qq "$package" 2>log && dpkg-deb --fsys-tarfile ./*.deb |
     tar -x -C "$into" --wildcards --transform='s,.*/,,' '*vk_swiftshader*') || [ ! -s "$into/vk_swiftshader_icd.json" ]; then
-    say "that failed ($(tail -n 1 "$into/package/log")): tests on a second driver are skipped"
+    lacks "SwiftShader, out of the package $package ($(tail -n 1 "$into/package/log")): tests on a second driver are skipped"
     rm -f "$into/vk_swiftshader_icd.json"
   fi
   rm -rf "$into/package"
 }
 
-# The form of a user study is filled in by a browser. Ubuntu's package is a snap, which needs a daemon.
-browser() {
-  command -v chromedriver >/dev/null && command -v chromium chromium-browser google-chrome >/dev/null && return
-  if ! grep -qs '^ID=debian' /etc/os-release || ! knows chromium-driver; then
-    say "no chromium with chromedriver here: tests in a browser are skipped"
+# Debian's packages that only tests need and that other systems have in other forms: where they cannot be had, the
+# tests that need them are skipped.
+for_tests() {
+  local what=$1 && shift
+  if ! grep -qs '^ID=debian' /etc/os-release || ! knows "$1"; then
+    missing "no package $1: $what are skipped"
     return
   fi
-  say "installing chromium and chromium-driver, in which tests fill in a form"
-  apt_quietly install -y -qq --no-install-recommends chromium chromium-driver ||
-    say "that failed: tests in a browser are skipped"
+  say "installing $*, for $what"
+  apt_quietly install -y -qq --no-install-recommends "$@" || lacks "the packages $*: $what are skipped"
 }
 tests_only() {
   [ "$mode" = run ] && return
   second_driver
-  browser
+  # The form of a user study is filled in by a browser. Ubuntu's package is a snap, which needs a daemon.
+  if ! command -v chromedriver >/dev/null || ! command -v chromium chromium-browser google-chrome >/dev/null; then
+    for_tests "tests in a browser" chromium chromium-driver
+  fi
+  command -v ffmpeg >/dev/null || for_tests "tests of MP4 films" ffmpeg
 }
 
 if [ ${#want[@]} -eq 0 ] && [ -z "$driver" ]; then

@@ -5,19 +5,33 @@
 # window at rest. Other arguments go to `cargo test`; those of the Python package (tools/python.sh) follow unless the
 # arguments choose tests.
 #
-# Where something is missing, tests say that they are skipped, which `cargo test` shows with `-- --nocapture` only.
-# With INSONIFY_NO_SKIP=1 they fail instead, but for those on data that do not ship; with INSONIFY_NO_SKIP=all
-# these fail, too.
+# The last lines say, a line each, which programs passed, failed or died and how long they took, which tests were
+# skipped and why, and what could not be reached. A program that dies does not hide the others.
+# Exit code: 0, all passed; 1, something failed or died; 2, nothing failed, but something that the tests
+# need could not be had, so that this is no pass.
+#
+# With INSONIFY_NO_SKIP=1 tests without what they need fail instead of being skipped, but for those on data that do
+# not ship; with INSONIFY_NO_SKIP=all these fail, too.
 set -eu
 cd "$(dirname "$0")/.."
+started=$SECONDS
 long=()
 if [ "${1:-}" = --long ]; then
   shift
   long=(--include-ignored)
 fi
+mkdir -p target/report
+report=$PWD/target/report
+rm -f "$report"/*
+# Where set-up and tests write what they lack and skip.
+export INSONIFY_LACKS=$report/lacks INSONIFY_SKIPPED=$report/skipped
+: >"$INSONIFY_LACKS"
+: >"$INSONIFY_SKIPPED"
 ./tools/setup.sh
+set_up=$((SECONDS - started))
 export INSONIFY_VALIDATE=1
-# As the program itself has it (src/gpu/process.rs): llvmpipe compiles in a third of the time.
+# As the program itself has it (src/gpu/process.rs), in the program's own folder; .cargo/config.toml has the same for
+# `cargo test` alone, in target/.
 if [ -z "${LP_NATIVE_VECTOR_WIDTH:-}${MESA_SHADER_CACHE_DIR:-}" ]; then
   export LP_NATIVE_VECTOR_WIDTH=128 MESA_SHADER_CACHE_DIR=${XDG_CACHE_HOME:-$HOME/.cache}/insonify/mesa
   mkdir -p "$MESA_SHADER_CACHE_DIR"
@@ -25,23 +39,41 @@ fi
 # Tests of the window wait for it more than they compute: at least four at once.
 threads=$(nproc)
 export RUST_TEST_THREADS=${RUST_TEST_THREADS:-$((threads < 4 ? 4 : threads))}
-[ -e ../shared/data ] || echo "skipped: no shared data (tests on real meshes)"
-failed=0
-if [ ${#long[@]} -eq 0 ]; then
-  cargo test --features anatomy "$@" || failed=$?
-else
-  case " $* " in
-  *" -- "*) cargo test --features anatomy "$@" "${long[@]}" || failed=$? ;;
-  *) cargo test --features anatomy "$@" -- "${long[@]}" || failed=$? ;;
-  esac
-fi
+[ -e ../shared/data ] || echo "no shared data (tests on real meshes)" >>"$INSONIFY_SKIPPED"
+
 features=anatomy
+arguments=() chosen=
 while [ $# -gt 0 ]; do
   case $1 in
   --features) features=anatomy,$2 && shift 2 ;;
   --no-fail-fast) shift ;;
-  *) exit "$failed" ;;
+  --) shift && long+=("$@") && chosen=1 && break ;;
+  *) arguments+=("$1") && chosen=1 && shift ;;
   esac
 done
-FEATURES=$features ./tools/python.sh || failed=$?
-exit "$failed"
+built=$SECONDS
+cargo test --features "$features" --no-run "${arguments[@]}" 2>&1 | tee "$report/build"
+built=$((SECONDS - built))
+tested=$SECONDS
+cargo test --features "$features" --no-fail-fast "${arguments[@]}" -- "${long[@]}" 2>&1 | tee "$report/tests" || true
+tested=$((SECONDS - tested))
+python=$SECONDS
+if [ -z "$chosen" ]; then
+  FEATURES=$features ./tools/python.sh 2>&1 | tee "$report/python" ||
+    { [ -s "$INSONIFY_LACKS" ] || echo "ERROR python/tests: tools/python.sh, see above" >>"$report/python"; }
+fi
+python=$((SECONDS - python))
+
+echo
+echo "==== summary ===="
+code=0
+cat "$report"/build "$report"/tests "$report"/python 2>/dev/null | awk -f tools/summary.awk || code=1
+sort "$INSONIFY_SKIPPED" | uniq -c | sed -E 's/^ *([0-9]+) (.*)/skipped \1 times: \2/'
+sort -u "$INSONIFY_LACKS" | sed 's/^/lacking /'
+echo "times   set-up $set_up s, build $built s, tests $tested s, Python $python s"
+if [ "$code" = 0 ] && [ -s "$INSONIFY_LACKS" ]; then
+  echo "result  NOT COMPLETE: what is lacking was not tested"
+  exit 2
+fi
+[ "$code" = 0 ] && echo "result  passed" || echo "result  FAILED"
+exit "$code"
