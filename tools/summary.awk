@@ -1,6 +1,5 @@
 # Sums up the output of `cargo test` and of pytest, a line for each program: what passed, failed with names, or died, and
-# its time. Exit code 1 if anything failed, died, or nothing was run.
-# Variables: `tail`, the last lines of a program that ended without a result, are taken from its output.
+# its time. Exit code 1 if anything failed or died, or nothing was run.
 
 function close_program() {
   if (program == "") return
@@ -56,7 +55,7 @@ program != "" && /^test result: / {
   report(n ? "failed" : "passed", "python/tests", $0 (n ? pytest : ""))
 }
 /^(FAILED|ERROR) python\// { pytest = pytest " " $2 }
-program != "" && NF { last = $0 }
+program != "" && NF && !/^(error: |Caused by:|test .* \.\.\. ok$)/ { last = $0 }
 
 END {
   close_program()

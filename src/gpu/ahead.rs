@@ -14,9 +14,11 @@ use std::io::{Read, Write};
 use std::path::PathBuf;
 use std::process::{Command, ExitStatus, Stdio};
 use std::sync::{Arc, OnceLock};
+use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
 
+use super::blas::{Blas, BlasInput, BlasOptions};
 use super::commands::{Binding, Commands};
 use super::device::{Device, DeviceOptions};
 use super::error::GpuError;
@@ -24,7 +26,7 @@ use super::image::{AddressMode, Filter, Image, ImageDim, ImageFormat, Sampler};
 use super::kernel::Kernel;
 use super::memory::{Buffer, BufferKind};
 use super::reflect::{BindingInfo, BindingKind};
-use super::tlas::Tlas;
+use super::tlas::{Tlas, TlasInstance};
 use super::{Stage, kept, process};
 
 /// The argument with which a program of ours is started as a compiler.
@@ -49,7 +51,7 @@ pub(super) fn has_compiler() -> bool {
 
 /// A kernel to be compiled for a device.
 #[derive(Serialize, Deserialize)]
-pub(super) struct Job {
+pub(super) struct KernelJob {
     /// Name of the device.
     pub(super) device: String,
     /// Name of the kernel.
@@ -57,6 +59,17 @@ pub(super) struct Job {
     pub(super) spirv: Vec<u32>,
     pub(super) specialization: Vec<(u32, u32)>,
 }
+
+/// Work that a driver may not survive.
+#[derive(Serialize, Deserialize)]
+enum Job {
+    Kernel(KernelJob),
+    /// Acceleration structures to be built, on the device of this name.
+    Structures(String),
+}
+
+/// Longest time for building two small structures, on a machine however busy: faults of memory may also end in a loop.
+const PATIENCE: Duration = Duration::from_secs(120);
 
 /// End of a driver's compiler.
 #[derive(Clone, Debug)]
@@ -68,12 +81,12 @@ pub(crate) struct Died {
 }
 
 impl Died {
-    /// The error of a kernel on a device.
-    pub(crate) fn of(self, device: &Device, kernel: &str) -> GpuError {
+    /// The error of a device on a piece of work, such as "on the kernel 'beam'".
+    pub(crate) fn of(&self, device: &Device, work: &str) -> GpuError {
         let [width, _] = kept::MESA_VARIABLES.map(|name| std::env::var(name).ok());
-        GpuError::Compiler {
+        GpuError::Driver {
             device: device.name().into(),
-            kernel: kernel.into(),
+            work: work.into(),
             status: self.status,
             words: if self.words.is_empty() { String::new() } else { format!(": {}", self.words) },
             width: width.unwrap_or("the processor's".into()),
@@ -83,14 +96,22 @@ impl Died {
 
 /// Compiles a kernel, in a process of its own where there is a program for that. An error of Vulkan occurs again, and is
 /// reported, where the kernel is needed.
-pub(super) fn compile(job: &Job) -> Result<(), Died> {
-    match COMPILER.get().and_then(|compiler| compile_apart(compiler, job)) {
+pub(super) fn compile(job: KernelJob) -> Result<(), Died> {
+    let job = Job::Kernel(job);
+    match COMPILER.get().and_then(|compiler| apart(compiler, &job)) {
         Some(compiled) => compiled.map(|_| ()),
         None => {
-            let _ = compile_here(job);
+            let _ = job.run();
             Ok(())
         }
     }
+}
+
+/// Builds small acceleration structures on a device of this name, in a process of its own where there is a program for
+/// that: Mesa 26.2 writes outside its memory there, for vectors of four. Nothing is known of other programs.
+pub(super) fn build_structures(device: &str) -> Result<(), Died> {
+    let job = Job::Structures(device.into());
+    COMPILER.get().and_then(|compiler| apart(compiler, &job)).unwrap_or(Ok(true)).map(|_| ())
 }
 
 /// Compiles a kernel in a process of its own. Returns whether the driver took it.
@@ -107,25 +128,35 @@ pub fn try_kernel(
     specialization: &[(u32, u32)],
 ) -> Result<bool, GpuError> {
     let compiler = COMPILER.get().expect("prepare_process was called");
-    let job = Job {
+    let job = KernelJob {
         device: device.name().into(),
         kernel: name.into(),
         spirv: spirv.into(),
         specialization: specialization.into(),
     };
-    let compiled = compile_apart(compiler, &job).expect("this program is a compiler");
-    compiled.map_err(|died| died.of(device, name))
+    let compiled = apart(compiler, &Job::Kernel(job)).expect("this program is a compiler");
+    compiled.map_err(|died| died.of(device, &format!("on the kernel '{name}'")))
 }
 
-/// Returns whether Vulkan took the kernel; `None` where the program cannot be started as a compiler.
-fn compile_apart(compiler: &(PathBuf, Vec<OsString>), job: &Job) -> Option<Result<bool, Died>> {
+/// Does a job in a process of its own. Returns whether Vulkan did it; `None` where the program cannot be started so.
+fn apart(compiler: &(PathBuf, Vec<OsString>), job: &Job) -> Option<Result<bool, Died>> {
     let mut command = Command::new(&compiler.0);
     command.args(&compiler.1).env_remove("INSONIFY_VALIDATE");
     command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = command.spawn().ok()?;
     let text = serde_json::to_vec(job).ok()?;
-    // A compiler that does not read is told by its greeting.
+    // A program that does not read is told by its greeting.
     let _ = child.stdin.take()?.write_all(&text);
+    // How long a kernel takes to compile nobody knows.
+    if matches!(job, Job::Structures(_)) {
+        let end = Instant::now() + PATIENCE;
+        while child.try_wait().ok()?.is_none() {
+            if Instant::now() > end {
+                let _ = child.kill();
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
     let out = child.wait_with_output().ok()?;
     if !out.stdout.starts_with(GREETING.as_bytes()) {
         return None;
@@ -139,24 +170,48 @@ fn compile_apart(compiler: &(PathBuf, Vec<OsString>), job: &Job) -> Option<Resul
     Some(Err(Died { status: out.status, words: words.unwrap_or_default().trim().to_owned() }))
 }
 
-/// Compiles the kernel that standard input describes, which another process of this program has started it for; the
-/// driver keeps the result. Returns the exit code.
+/// Does the job that standard input describes, which another process of this program has started it for: a kernel is
+/// compiled, and the driver keeps the result. Returns the exit code.
 pub fn compile_standard_input() -> u8 {
     process::without_core_file();
     let mut out = std::io::stdout();
     let greeted = out.write_all(GREETING.as_bytes()).and_then(|()| out.flush());
     let mut text = Vec::new();
     let read = greeted.and_then(|()| std::io::stdin().read_to_end(&mut text));
-    let job = read.ok().and_then(|_| serde_json::from_slice(&text).ok());
-    let done = job.is_some_and(|job| compile_here(&job).is_ok());
+    let job = read.ok().and_then(|_| serde_json::from_slice::<Job>(&text).ok());
+    let done = job.is_some_and(|job| job.run().is_ok());
     u8::from(!done)
 }
 
-fn compile_here(job: &Job) -> Result<(), GpuError> {
-    let options = DeviceOptions { selector: Some(job.device.clone()), ..DeviceOptions::default() };
-    let device = Device::new(&options)?;
-    let kernel = Kernel::when_needed(&device, &job.kernel, &job.spirv, &job.specialization)?;
-    dispatch_nothing(&device, &kernel)
+impl Job {
+    /// Does it in this process.
+    fn run(&self) -> Result<(), GpuError> {
+        let open = |name: &String| {
+            Device::new(&DeviceOptions { selector: Some(name.clone()), ..Default::default() })
+        };
+        match self {
+            Self::Kernel(job) => {
+                let device = open(&job.device)?;
+                let kernel =
+                    Kernel::when_needed(&device, &job.kernel, &job.spirv, &job.specialization)?;
+                dispatch_nothing(&device, &kernel)
+            }
+            Self::Structures(name) => build_two(&open(name)?),
+        }
+    }
+}
+
+/// Builds a mesh of some triangles, and a scene of it.
+fn build_two(device: &Arc<Device>) -> Result<(), GpuError> {
+    let positions: Vec<[f32; 3]> =
+        (0..96).map(|i| [(i % 7) as f32, (i % 11) as f32, (i % 13) as f32]).collect();
+    let triangles: Vec<[u32; 3]> = (0..32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    let input = BlasInput { name: "trial", positions: &positions, triangles: &triangles };
+    let blas = Blas::build_many(device, &[input], BlasOptions::default())?.remove(0);
+    let mut tlas = Tlas::new(device, "trial", 1)?;
+    let transform = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
+    let instance = TlasInstance { blas: &blas, transform, custom_index: 0, mask: 1 };
+    device.once(|commands| tlas.build(commands, &[instance]))
 }
 
 /// An object that a kernel can bind, as small as possible: nobody reads it.
@@ -236,43 +291,40 @@ mod tests {
             dispatch_nothing(&device, &kernel).unwrap();
         }
         assert_eq!(device.validation_messages(), [""; 0]);
-        let job = |device: &str, constant| Job {
-            device: device.into(),
-            kernel: "add".into(),
-            spirv: add.clone(),
-            specialization: vec![(constant, 3)],
+        let job = |device: &str, constant| {
+            Job::Kernel(KernelJob {
+                device: device.into(),
+                kernel: "add".into(),
+                spirv: add.clone(),
+                specialization: vec![(constant, 3)],
+            })
         };
-        compile_here(&job(device.name(), 1)).unwrap();
-        assert!(compile_here(&job(device.name(), 9)).is_err());
-        assert!(compile_here(&job("no such device", 1)).is_err());
+        job(device.name(), 1).run().unwrap();
+        assert!(job(device.name(), 9).run().is_err());
+        assert!(job("no such device", 1).run().is_err());
+        if device.supports_acceleration_structure() {
+            build_two(&device).unwrap();
+            assert_eq!(device.validation_messages(), [""; 0]);
+        }
     }
 
     #[test]
     fn a_program_that_is_no_compiler_is_not_waited_for() {
-        let job = Job {
-            device: "it".into(),
-            kernel: "add".into(),
-            spirv: vec![0; 1 << 16],
-            specialization: vec![],
-        };
+        // More than a pipe holds.
+        let job = Job::Structures("x".repeat(1 << 20));
         let here = std::env::current_exe().unwrap();
         let listing = (here, vec!["--list".into(), "no such test".into()]);
-        assert!(compile_apart(&listing, &job).is_none());
-        assert!(compile_apart(&("no such program".into(), vec![]), &job).is_none());
+        assert!(apart(&listing, &job).is_none());
+        assert!(apart(&("no such program".into(), vec![]), &job).is_none());
     }
 
     #[cfg(unix)]
     #[test]
     fn the_end_of_a_compiler_is_told() {
-        let job = Job {
-            device: "it".into(),
-            kernel: "add".into(),
-            spirv: vec![0; 64],
-            specialization: vec![],
-        };
         let compile = |then: &str| {
             let script = format!("printf '{GREETING}'; cat >/dev/null; {then}");
-            compile_apart(&("sh".into(), vec!["-c".into(), script.into()]), &job)
+            let compiler = ("sh".into(), vec!["-c".into(), script.into()]);
+            apart(&compiler, &Job::Structures("it".into()))
         };
         assert!(matches!(compile("exit 0"), Some(Ok(true))));
         assert!(matches!(compile("exit 1"), Some(Ok(false))), "the device in use meets the error");
@@ -280,7 +332,7 @@ mod tests {
         let died = died.unwrap().unwrap_err();
         assert_eq!(died.words, "LLVM ERROR: no such copy");
         let device = lone_test_device();
-        let text = died.of(&device, "add").to_string();
+        let text = died.of(&device, "on the kernel 'add'").to_string();
         for part in [device.name(), "'add'", "signal: 6", "no such copy", "LP_NATIVE_VECTOR_WIDTH"]
         {
             assert!(text.contains(part), "{text}");

@@ -4,13 +4,14 @@ mod create;
 
 use std::ffi::CString;
 use std::path::PathBuf;
-use std::sync::{Arc, LazyLock};
+use std::sync::{Arc, LazyLock, OnceLock};
 
 use ash::{ext, khr, vk};
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use parking_lot::Mutex;
 
 use super::adapter::{self, AdapterKind, DeviceInfo};
+use super::ahead;
 use super::error::GpuError;
 use super::instance::{Instance, LOADER_LISTS, ValidationLog};
 use super::kept::{self, PipelineStore};
@@ -22,6 +23,9 @@ use super::queues::Queues;
 /// of a small scene look like that of a large one; larger buffers get a block of their own anyway.
 const DEVICE_BLOCK_BYTES: u64 = 32 << 20;
 const HOST_BLOCK_BYTES: u64 = 16 << 20;
+
+/// The number that is remembered where the driver has built acceleration structures and lived: "lives", as bytes.
+const STRUCTURES_TRIED: u64 = 0x6c69_7665_7300_0000;
 
 /// Makes the test whether a device can show pictures in a window; it is dropped before the instance. The error is the
 /// window system's message.
@@ -91,6 +95,8 @@ pub struct Device {
     pub(crate) kept: PipelineStore,
     pub(crate) pipelines: Pipelines,
     ray_query: bool,
+    /// Outcome of the trial of acceleration structures, once they are needed.
+    structures: OnceLock<Result<(), ahead::Died>>,
     /// True for Mesa's driver for the processor.
     jit: bool,
     info: DeviceInfo,
@@ -182,6 +188,7 @@ impl Device {
             kept,
             pipelines: Pipelines::default(),
             ray_query: adapter.info.ray_query,
+            structures: OnceLock::new(),
             jit,
             limits: Limits {
                 max_storage_buffer_bytes: limits.max_storage_buffer_range.into(),
@@ -287,13 +294,26 @@ impl Device {
         self.kept.learn([what]);
     }
 
-    /// Acceleration-structure functions, or an error naming the device.
+    /// Acceleration-structure functions, or an error naming the device. Mesa's driver for the processor is first tried in
+    /// another process, once for a device, driver and width of vectors where that is kept.
     pub(crate) fn require_accel(&self) -> Result<&AccelSupport, GpuError> {
-        self.accel.as_ref().ok_or_else(|| GpuError::Unsupported {
+        let accel = self.accel.as_ref().ok_or_else(|| GpuError::Unsupported {
             device: self.info.name.clone(),
             feature: "acceleration structures (VK_KHR_acceleration_structure), or they are off"
                 .into(),
-        })
+        })?;
+        let tried = self.structures.get_or_init(|| {
+            if !self.jit || !self.kept.keeps() || self.remembers(STRUCTURES_TRIED) {
+                return Ok(());
+            }
+            ahead::build_structures(&self.info.name)?;
+            self.remember(STRUCTURES_TRIED);
+            Ok(())
+        });
+        match tried {
+            Ok(()) => Ok(accel),
+            Err(died) => Err(died.of(self, "while it built acceleration structures")),
+        }
     }
 
     /// Runs `work` with the allocator.

@@ -106,15 +106,15 @@ pub enum GpuError {
         /// The problem.
         problem: String,
     },
-    /// The driver's compiler ended its process on a kernel, which it did in a process of its own.
+    /// The driver ended its process on a kernel, or while it built acceleration structures, in a process of its own.
     #[error(
-        "the compiler of {device} ended on the kernel '{kernel}' ({status}){words}; this is a fault of the driver or its compiler. Take another width of vectors (LP_NATIVE_VECTOR_WIDTH=256 before the command; now {width}), the other tracer (--tracer bvh, --tracer ray-query), another device (--device; insonify info lists them), or another version of the driver"
+        "the driver of {device} ended {work} ({status}){words}; this is a fault of the driver or its compiler. Take another width of vectors (LP_NATIVE_VECTOR_WIDTH=256 before the command; now {width}), the other tracer (--tracer bvh, --tracer ray-query), another device (--device; insonify info lists them), or another version of the driver"
     )]
-    Compiler {
+    Driver {
         /// Name of the device.
         device: String,
-        /// Name of the kernel.
-        kernel: String,
+        /// The work: "on the kernel 'beam'".
+        work: String,
         /// The way in which the process ended.
         status: std::process::ExitStatus,
         /// Its last words, after a colon; empty without any.

@@ -64,6 +64,7 @@ pub(crate) struct PipelineStore {
     raw: ash::Device,
     cache: vk::PipelineCache,
     device: String,
+    properties: vk::PhysicalDeviceProperties,
     /// The file; without one nothing is kept.
     file: Option<PathBuf>,
     /// Kernels that have run on this device with this driver, and further numbers to be remembered for
@@ -106,6 +107,7 @@ impl PipelineStore {
             raw: raw.clone(),
             cache,
             device: device.to_owned(),
+            properties: *properties,
             file,
             known: Mutex::new(known),
             told: Arc::default(),
@@ -119,6 +121,11 @@ impl PipelineStore {
     /// Returns whether a number was learnt.
     pub(crate) fn knows(&self, what: u64) -> bool {
         self.known.lock().contains(&what)
+    }
+
+    /// Returns whether anything is kept from one start to the next.
+    pub(crate) fn keeps(&self) -> bool {
+        self.file.is_some()
     }
 
     /// Returns whether a kernel has never run here before; false where nothing is kept.
@@ -154,7 +161,11 @@ impl PipelineStore {
             return;
         }
         // SAFETY: the cache is alive and synchronises itself.
-        let data = unsafe { self.raw.get_pipeline_cache_data(self.cache) }.unwrap_or_default();
+        let mut data = unsafe { self.raw.get_pipeline_cache_data(self.cache) }.unwrap_or_default();
+        // Mesa 26.2's driver for the processor gives less than a header.
+        if !is_of(&data, &self.properties) {
+            data.clear();
+        }
         if let Err(error) = write(file, &encode(&known, &data)) {
             crate::output::note(format!(
                 "compiled kernels are not kept: {}: {error}",

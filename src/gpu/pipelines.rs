@@ -75,7 +75,7 @@ impl NotMade {
     pub(crate) fn of(self, device: &Device, kernel: &str) -> GpuError {
         match self {
             Self::Vulkan(code) => during(format!("creating the pipeline of '{kernel}'"))(code),
-            Self::Compiler(died) => died.of(device, kernel),
+            Self::Compiler(died) => died.of(device, &format!("on the kernel '{kernel}'")),
         }
     }
 }
@@ -221,13 +221,13 @@ impl Pipeline {
 
     fn make(&self) -> Result<vk::Pipeline, NotMade> {
         if let Some([device, kernel]) = &self.ahead {
-            let job = ahead::Job {
+            let job = ahead::KernelJob {
                 device: device.clone(),
                 kernel: kernel.clone(),
                 spirv: self.spirv.clone(),
                 specialization: self.specialization.clone(),
             };
-            ahead::compile(&job).map_err(NotMade::Compiler)?;
+            ahead::compile(job).map_err(NotMade::Compiler)?;
         }
         let info = vk::ShaderModuleCreateInfo::default().code(&self.spirv);
         // SAFETY: the words parsed as SPIR-V; the kernels of this crate are checked by spirv-val.
