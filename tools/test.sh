@@ -51,22 +51,26 @@ while [ $# -gt 0 ]; do
   *) arguments+=("$1") && chosen=1 && shift ;;
   esac
 done
-built=$SECONDS
-cargo test --features "$features" --no-run "${arguments[@]}" 2>&1 | tee "$report/build"
-built=$((SECONDS - built))
-tested=$SECONDS
-cargo test --features "$features" --no-fail-fast "${arguments[@]}" -- "${long[@]}" 2>&1 | tee "$report/tests" || true
-tested=$((SECONDS - tested))
-python=$SECONDS
-if [ -z "$chosen" ]; then
-  FEATURES=$features ./tools/python.sh 2>&1 | tee "$report/python" ||
-    { [ -s "$INSONIFY_LACKS" ] || echo "ERROR python/tests: tools/python.sh, see above" >>"$report/python"; }
+# Runs a command, with its output in a file of the report too. Returns its exit code.
+reported() {
+  local file=$report/$1 && shift
+  "$@" 2>&1 | tee "$file"
+  return "${PIPESTATUS[0]}"
+}
+code=0
+begun=$SECONDS
+reported build cargo test --features "$features" --no-run "${arguments[@]}" || code=1
+built=$((SECONDS - begun)) begun=$SECONDS
+[ "$code" != 0 ] || reported tests cargo test --features "$features" --no-fail-fast "${arguments[@]}" -- "${long[@]}" || code=1
+tested=$((SECONDS - begun)) begun=$SECONDS
+if [ -z "$chosen" ] && ! FEATURES=$features reported python ./tools/python.sh; then
+  # Not where its packages could not be had.
+  grep -q "tests of the Python package" "$INSONIFY_LACKS" || code=1
 fi
-python=$((SECONDS - python))
+python=$((SECONDS - begun))
 
 echo
 echo "==== summary ===="
-code=0
 cat "$report"/build "$report"/tests "$report"/python 2>/dev/null | awk -f tools/summary.awk || code=1
 sort "$INSONIFY_SKIPPED" | uniq -c | sed -E 's/^ *([0-9]+) (.*)/skipped \1 times: \2/'
 sort -u "$INSONIFY_LACKS" | sed 's/^/lacking /'
