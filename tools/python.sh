@@ -25,4 +25,4 @@ fi
 cargo build --features "${FEATURES:-anatomy}"
 cp target/debug/lib_insonify.so python/insonify/_insonify.abi3.so
 "$python" -m mypy --no-error-summary --cache-dir target/mypy python/insonify
-PYTHONPATH=$PWD/python "$python" -m pytest -q -p no:cacheprovider python/tests "$@"
+PYTHONPATH=$PWD/python "$python" -m pytest -q -rfEs -p no:cacheprovider python/tests "$@"

@@ -54,7 +54,8 @@ program != "" && /^test result: / {
   gsub(/=/, "")
   report(n ? "failed" : "passed", "python/tests", $0 (n ? pytest : ""))
 }
-/^(FAILED|ERROR) python\// { pytest = pytest " " $2 }
+/^(FAILED|ERROR) .*\.py/ { pytest = pytest " " $2 }
+/^SKIPPED \[/ { sub(/^SKIPPED \[[0-9]+\] /, ""); sub(/: (Skipped: )?(skipped: )?/, ", "); report("skipped", "python/tests", $0) }
 program != "" && NF && !/^(error: |Caused by:|test .* \.\.\. ok$)/ { last = $0 }
 
 END {
