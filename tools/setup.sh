@@ -125,6 +125,12 @@ tests_only() {
   if ! command -v chromedriver >/dev/null || ! command -v chromium chromium-browser google-chrome >/dev/null; then
     for_tests "tests in a browser" chromium chromium-driver
   fi
+  # By this name chromedriver speaks to its browser; every installed system has it, a bare tree may not.
+  if ! getent hosts localhost >/dev/null; then
+    say "adding localhost to /etc/hosts"
+    if [ "$(id -u)" = 0 ]; then echo "127.0.0.1 localhost" >>/etc/hosts; else echo "127.0.0.1 localhost" | sudo -n tee -a /etc/hosts >/dev/null; fi ||
+      lacks "the name localhost in /etc/hosts: tests in a browser fail"
+  fi
   command -v ffmpeg >/dev/null || for_tests "tests of MP4 films" ffmpeg
 }
 

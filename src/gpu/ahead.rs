@@ -108,7 +108,7 @@ pub(super) fn compile(job: KernelJob) -> Result<(), Died> {
 }
 
 /// Builds small acceleration structures on a device of this name, in a process of its own where there is a program for
-/// that: Mesa 26.2 writes outside its memory there, for vectors of four. Nothing is known of other programs.
+/// that: Mesa 26.2 writes outside its memory there, for vectors of four. Where there is no such program, nothing is tried.
 pub(super) fn build_structures(device: &str) -> Result<(), Died> {
     let job = Job::Structures(device.into());
     COMPILER.get().and_then(|compiler| apart(compiler, &job)).unwrap_or(Ok(true)).map(|_| ())
@@ -143,6 +143,7 @@ fn apart(compiler: &(PathBuf, Vec<OsString>), job: &Job) -> Option<Result<bool, 
     let mut command = Command::new(&compiler.0);
     command.args(&compiler.1).env_remove("INSONIFY_VALIDATE");
     command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    process::not_interrupted(&mut command);
     let mut child = command.spawn().ok()?;
     let text = serde_json::to_vec(job).ok()?;
     // A program that does not read is told by its greeting.

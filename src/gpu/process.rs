@@ -3,6 +3,7 @@
 
 use std::ffi::OsString;
 use std::path::PathBuf;
+use std::process::Command;
 
 use super::{ahead, kept};
 
@@ -59,6 +60,15 @@ pub(super) fn without_core_file() {
         // SAFETY: the structure is alive during the call, which can only fail.
         unsafe { libc::setrlimit(libc::RLIMIT_CORE, &none) };
     }
+}
+
+/// Keeps an interrupt of the terminal, Ctrl-C, from a process to be started: whoever waits for it would take its end for
+/// a fault.
+pub(super) fn not_interrupted(command: &mut Command) {
+    #[cfg(unix)]
+    std::os::unix::process::CommandExt::process_group(command, 0);
+    #[cfg(not(unix))]
+    let _ = command;
 }
 
 fn share_heaps() {
