@@ -134,7 +134,7 @@ mod tests {
 
     use super::{HazardCheck, Stage, all_work};
 
-    /// What newer layers check, also where the installed ones do not: structures are read by shaders only where ray
+    /// The rule of newer layers, held also where the installed ones do not check it: structures are read by shaders only where ray
     /// queries are on, and no stage or access of builds is named where structures are off.
     #[test]
     fn masks_are_of_features_that_are_on() {
