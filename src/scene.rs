@@ -4,6 +4,7 @@
 //! (g/cm3 times mm/us). Attenuation stays dB/(cm MHz). Angles are radians.
 
 use std::ops::{Deref, DerefMut};
+use std::sync::Arc;
 
 use glam::DAffine3;
 
@@ -156,8 +157,8 @@ pub struct Scene {
     pub tissues: Vec<Tissue>,
     /// Tissue outside every mesh: index into [`Scene::tissues`].
     pub background: usize,
-    /// Triangle meshes.
-    pub meshes: Vec<Mesh>,
+    /// Triangle meshes, which clones of the scene share: many are made, for sessions, samples, moments.
+    pub meshes: Vec<Arc<Mesh>>,
     /// Placed meshes in their present state.
     pub instances: Vec<Instance>,
     /// The graph that gives [`Scene::instances`] over time; empty where nothing moves.
@@ -228,5 +229,23 @@ impl Scene {
     /// Number of triangles of all placed meshes.
     pub fn triangles(&self) -> usize {
         self.instances.iter().map(|i| self.meshes[i.mesh].triangles.len()).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Sessions, samples and moments are clones of a scene.
+    #[test]
+    fn clones_have_the_same_vertices_in_memory() {
+        let liver = Tissue::shipped("liver").expect("shipped");
+        let mut scene = Scene::homogeneous(liver, Probe::abdominal());
+        scene.meshes = [4.0, 5.0].map(|radius| Arc::new(shapes::sphere(radius, 2))).into();
+        let at = |scene: &Scene| -> Vec<_> {
+            scene.meshes.iter().map(|mesh| mesh.positions.as_ptr()).collect()
+        };
+        assert_eq!(at(&scene), at(&scene.clone()));
+        assert_eq!(at(&scene), at(&scene.still()));
     }
 }

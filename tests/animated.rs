@@ -22,7 +22,7 @@ fn instance<'a>(scene: &'a Scene, name: &str) -> &'a Instance {
 /// Keyframes of a mesh, in order.
 fn keyframes<'a>(scene: &'a Scene, name: &str) -> Vec<&'a Mesh> {
     let meshes = &instance(scene, name).keyframes.meshes;
-    meshes.iter().map(|&m| &scene.meshes[m]).collect()
+    meshes.iter().map(|&m| &*scene.meshes[m]).collect()
 }
 
 fn corners(mesh: &Mesh) -> impl Iterator<Item = [DVec3; 3]> + '_ {
@@ -194,7 +194,7 @@ fn extent<'a>(meshes: impl IntoIterator<Item = &'a Mesh>) -> (DVec3, DVec3) {
 fn the_fetus_has_the_sizes_of_eleven_weeks() {
     let scene = shipped("fetus");
     assert!(scene.triangles() <= 40_000, "{}", scene.triangles());
-    let mesh = |name: &str| &scene.meshes[instance(&scene, name).mesh];
+    let mesh = |name: &str| &*scene.meshes[instance(&scene, name).mesh];
     for at in &scene.instances {
         assert_eq!(open_edges(&scene.meshes[at.mesh]), 0, "{}", at.name);
         assert!(volume(&scene.meshes[at.mesh]) > 0.0, "{}", at.name);

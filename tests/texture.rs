@@ -76,7 +76,7 @@ fn scene(map: impl Fn(DVec3) -> DVec3) -> Scene {
         }
         mesh
     };
-    scene.meshes = vec![shape(&|p| p), shape(&map)];
+    scene.meshes = vec![shape(&|p| p).into(), shape(&map).into()];
     let smooth = Surface { roughness: f64::INFINITY, thickness: 0.0, specularity: 1.0, gain: 0.0 };
     scene.instances = vec![Instance {
         name: "body".into(),
@@ -351,7 +351,7 @@ fn heart(grouped: bool) -> Option<[f64; 3]> {
     for name in ["EPICARDIAL", "LV_ENDOCARDIAL", "RV_ENDOCARDIAL"] {
         let first = scene.meshes.len();
         let file = |phase: usize| folder.join(format!("patient1_{name}_{phase:03}.obj"));
-        scene.meshes.extend((0..25).map(|phase| unwelded(&file(phase))));
+        scene.meshes.extend((0..25).map(|phase| unwelded(&file(phase)).into()));
         let mut instance = placed.clone();
         instance.world_from_object = DAffine3::IDENTITY;
         instance.keyframes.meshes = (first..first + 25).collect();

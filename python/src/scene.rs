@@ -104,8 +104,8 @@ impl State {
                 "mesh `{name}` has {own} vertices, not {given}"
             )));
         }
-        let shape = surface.shape(positions);
-        self.file.give(name, shape.clone());
+        let shape = Arc::new(surface.shape(positions));
+        self.file.give(name, Arc::clone(&shape));
         self.scene.reshape(instance, shape);
         Ok(())
     }
@@ -240,7 +240,7 @@ impl Scene {
         let mut file = SceneFile::of(&folder.join("Scene()"), text);
         let mut kept = HashMap::new();
         for (name, surface, mesh) in surfaces {
-            file.give(&name, mesh);
+            file.give(&name, mesh.into());
             kept.insert(name, surface);
         }
         Self::made(py.detach(|| State::new(file, Vec::new(), kept)))

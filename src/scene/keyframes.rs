@@ -1,5 +1,7 @@
 //! Keyframes: shapes of an instance over time, and the device's strategy for them.
 
+use std::sync::Arc;
+
 use super::{Mesh, Scene};
 use crate::settings::words;
 use glam::DVec3;
@@ -77,7 +79,7 @@ impl Scene {
     ///
     /// # Panics
     /// Another topology; an instance with keyframes of its own.
-    pub fn reshape(&mut self, instance: usize, shape: Mesh) {
+    pub fn reshape(&mut self, instance: usize, shape: Arc<Mesh>) {
         let keyframes = &self.instances[instance].keyframes;
         let [rest, live] = match keyframes.meshes[..] {
             [] => [self.instances[instance].mesh, self.meshes.len()],
@@ -114,11 +116,11 @@ impl Scene {
             let between = keyframes.blend.iter().filter(|(_, weight)| *weight != 0.0);
             if keyframes.strategy == Strategy::Interpolate && between.count() > 1 {
                 instance.mesh = still.meshes.len();
-                still.meshes.push(keyframes.blended(&self.meshes));
+                still.meshes.push(keyframes.blended(&self.meshes).into());
             }
             if !std::mem::replace(&mut instance.shown, true) {
                 instance.mesh = still.meshes.len();
-                still.meshes.push(Mesh::default());
+                still.meshes.push(Arc::default());
             }
         }
         still
@@ -130,12 +132,13 @@ impl Keyframes {
     ///
     /// # Panics
     /// The keyframes do not share their topology.
-    pub fn blended(&self, meshes: &[Mesh]) -> Mesh {
+    pub fn blended(&self, meshes: &[Arc<Mesh>]) -> Mesh {
         let first = &meshes[self.meshes[0]];
         let mut out = Mesh {
+            name: first.name.clone(),
             positions: vec![[0.0; 3]; first.positions.len()],
             normals: vec![[0.0; 3]; first.normals.len()],
-            ..first.clone()
+            triangles: first.triangles.clone(),
         };
         let mut sums =
             [vec![DVec3::ZERO; first.positions.len()], vec![DVec3::ZERO; first.normals.len()]];

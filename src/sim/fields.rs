@@ -235,7 +235,7 @@ struct InstanceFields {
 /// first.
 fn keyframes<'a>(scene: &'a Scene, instance: &Instance) -> Option<Vec<&'a Mesh>> {
     let meshes: Vec<&Mesh> =
-        (instance.keyframes.meshes.iter()).map(|&m| &scene.meshes[m]).collect();
+        (instance.keyframes.meshes.iter()).map(|&m| &*scene.meshes[m]).collect();
     let (reference, others) = meshes.split_first()?;
     let same = |mesh: &&Mesh| mesh.shares_topology(reference);
     let moves = |mesh: &&Mesh| mesh.positions != reference.positions;

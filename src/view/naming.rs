@@ -1,5 +1,6 @@
 //! What lies where the pointer asks: the mesh and its tissue, by a right click on image or 3D view.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use egui::{Area, Frame, Id, Order, Pos2, RichText, Ui};
@@ -84,7 +85,7 @@ fn on_plane(model: &Model, ray: &Ray) -> Option<DVec3> {
 
 /// Distances at which a ray crosses a placed mesh, in units of `direction`.
 fn crossings<'m>(
-    meshes: &'m [Mesh],
+    meshes: &'m [Arc<Mesh>],
     instance: &Instance,
     (origin, direction): (DVec3, DVec3),
 ) -> impl Iterator<Item = f64> + 'm {
@@ -101,7 +102,7 @@ fn crossings<'m>(
 
 /// The mesh in whose tissue a point lies: of the highest priority, and of those the last one that a line from the
 /// probe enters; none in the background.
-fn enclosing(meshes: &[Mesh], all: &[Instance], point: DVec3, probe: DVec3) -> Option<usize> {
+fn enclosing(meshes: &[Arc<Mesh>], all: &[Instance], point: DVec3, probe: DVec3) -> Option<usize> {
     let mut best: Option<(i32, f64, usize)> = None;
     for (index, instance) in all.iter().enumerate().filter(|(_, i)| i.shown) {
         let line = (point, (probe - point).normalize_or(DVec3::NEG_Z));
@@ -119,7 +120,7 @@ fn enclosing(meshes: &[Mesh], all: &[Instance], point: DVec3, probe: DVec3) -> O
 
 /// The first of the wanted meshes that a ray meets.
 fn nearest(
-    meshes: &[Mesh],
+    meshes: &[Arc<Mesh>],
     all: &[Instance],
     ray: (DVec3, DVec3),
     wanted: impl Fn(&Instance) -> bool,

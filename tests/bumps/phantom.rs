@@ -134,7 +134,7 @@ pub fn place(scene: &mut Scene, mesh: Mesh, tissue: usize, at: DAffine3) {
         world_from_object: at,
         surface: [silent; 2],
     });
-    scene.meshes.push(mesh);
+    scene.meshes.push(mesh.into());
 }
 
 /// The scene with surfaces that refract so.

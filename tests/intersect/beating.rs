@@ -1,6 +1,7 @@
 //! T32's scenes: instances with keyframes by every strategy, and a union box for the paper's price.
 
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 use glam::{DAffine3, DVec3};
 use insonify::scene::{Keyframes, Mesh, Scene, Strategy, shapes};
@@ -45,7 +46,7 @@ pub fn beating(strategy: Strategy) -> Scene {
             false => 2,
         };
         let first = scene.meshes.len();
-        scene.meshes.extend((0..KEYFRAMES).map(|k| beat(k, fine(k))));
+        scene.meshes.extend((0..KEYFRAMES).map(|k| beat(k, fine(k)).into()));
         scene.instances[instance].keyframes = Keyframes {
             meshes: (first..first + KEYFRAMES).collect(),
             strategy,
@@ -111,7 +112,7 @@ pub struct UnionBox {
 pub fn union_box(spread: f64, rig: impl Fn(&Scene) -> Rig) -> UnionBox {
     let mut scene = scene(vec![(shapes::cuboid([30.0, 12.0, 20.0]), DAffine3::IDENTITY)]);
     let mut moved = scene.meshes[0].clone();
-    for p in &mut moved.positions {
+    for p in &mut Arc::make_mut(&mut moved).positions {
         p[0] += spread as f32;
     }
     scene.meshes.push(moved);

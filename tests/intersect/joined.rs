@@ -83,7 +83,7 @@ fn keyframes_of_one_group_share_structures() {
                 for p in &mut mesh.positions {
                     *p = p.map(|x| x * scale);
                 }
-                mesh
+                mesh.into()
             }));
             let instance = &mut scene.instances[i];
             instance.keyframes.meshes = (first..first + 3).collect();

@@ -14,6 +14,8 @@ mod splits;
 mod suite;
 mod walk;
 
+use std::sync::Arc;
+
 use compare::{Found, Verdict, by_aim, expected, judge, slips};
 use device::{Rig, Traced};
 use glam::{DAffine3, DVec3};
@@ -204,7 +206,7 @@ fn planted_errors_are_noticed() {
     assert!(found_wrong(&rig) > 0, "a missing triangle goes unnoticed");
 
     let mut less = scene.clone();
-    less.meshes[0].triangles[17] = [0; 3];
+    Arc::make_mut(&mut less.meshes[0]).triangles[17] = [0; 3];
     for tracer in TRACERS {
         assert!(found_wrong(&Rig::new(&less, tracer)) > 0, "{tracer}: a hole goes unnoticed");
     }

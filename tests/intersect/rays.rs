@@ -84,7 +84,7 @@ pub fn scene(placed: Vec<(Mesh, DAffine3)>) -> Scene {
                 world_from_object,
                 surface: [surface; 2],
             };
-            (mesh, instance)
+            (mesh.into(), instance)
         })
         .unzip();
     Scene { meshes, instances, ..Scene::homogeneous(tissue, Probe::abdominal()) }

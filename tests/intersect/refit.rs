@@ -1,5 +1,7 @@
 //! Hierarchies refitted on the device: rays meet the moved triangles as brute force says.
 
+use std::sync::Arc;
+
 use glam::DAffine3;
 use insonify::gpu::{Binding, Buffer, Kernel, Stage};
 use insonify::scene::{Scene, shapes};
@@ -27,7 +29,7 @@ fn rest() -> Scene {
 /// Adds bumps and dents within the box of the mesh at rest: the top level stays as it is.
 fn deform(scene: &mut Scene) {
     for mesh in &mut scene.meshes {
-        for p in &mut mesh.positions {
+        for p in &mut Arc::make_mut(mesh).positions {
             let size = 0.7 + 0.25 * (0.4 * p[0]).sin() * (0.35 * p[1] + 0.3 * p[2]).cos();
             *p = p.map(|c| c * size);
         }
@@ -66,7 +68,7 @@ fn rays_through_a_refitted_hierarchy_are_those_of_brute_force() {
     let mut rig = Rig::split(&rest, Splits::Object);
     let positions: Vec<[f32; 3]> = moved.meshes.iter().flat_map(|m| m.positions.clone()).collect();
     let vertices = rig.storage("moved", bytemuck::cast_slice(&positions));
-    let trees: Vec<MeshBvh> = rest.meshes.iter().map(MeshBvh::build).collect();
+    let trees: Vec<MeshBvh> = rest.meshes.iter().map(|mesh| MeshBvh::build(mesh)).collect();
     let roots = rig.world.rows().iter().map(|row| row.bvh_root);
     let moving: Vec<_> = trees.iter().zip(roots).collect();
     let levels = levels(&moving);

@@ -85,9 +85,9 @@ fn a_shape_that_a_program_sets_moves_its_tissue_from_the_first_time_on() {
         let rest = scene.meshes[0].clone();
         let mut before = 1.0;
         for (index, squeeze) in [(1, 0.9), (2, 0.8)] {
-            let mut shape = rest.clone();
+            let mut shape = Mesh::clone(&rest);
             shape.positions.iter_mut().for_each(|p| p[2] *= squeeze as f32);
-            scene.reshape(0, shape);
+            scene.reshape(0, shape.into());
             let labels = frame(&mut simulator, &scene, index);
             let (error, seen) = worst(&labels.samples.labels, 0, |p| {
                 DVec3::Z * (p.z - middle.z) * (1.0 - before / squeeze)
@@ -102,12 +102,12 @@ fn a_shape_that_a_program_sets_moves_its_tissue_from_the_first_time_on() {
 /// A body whose second keyframe is the first one mapped by `map` about its middle.
 fn deforming(map: DMat3, strategy: Strategy) -> Scene {
     let mut scene = scene();
-    let rest = scene.meshes[0].clone();
+    let rest = Mesh::clone(&scene.meshes[0]);
     let mut squeezed = Mesh { name: "squeezed".into(), ..rest };
     for p in &mut squeezed.positions {
         *p = (map * DVec3::from(p.map(f64::from))).as_vec3().to_array();
     }
-    scene.meshes.push(squeezed);
+    scene.meshes.push(squeezed.into());
     scene.instances[0].keyframes =
         Keyframes { meshes: vec![0, 1], strategy, blend: blend(0.0), ..Keyframes::default() };
     scene

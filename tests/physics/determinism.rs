@@ -28,7 +28,7 @@ fn rough_sphere() -> Scene {
     scene.imaging.image_height = 400;
     scene.simulation.paths = 8;
     scene.simulation.max_reflections = 3;
-    scene.meshes.push(shapes::sphere(8.0, 3));
+    scene.meshes.push(shapes::sphere(8.0, 3).into());
     scene.tissues.push(tissue(1.600, 1.900, 0.7));
     scene.instances.push(Instance {
         name: "sphere".into(),

@@ -46,7 +46,7 @@ fn cylinder(lines: u32, [from, to]: [f64; 2], around: Tissue, inside: Tissue) ->
     scene.world_from_probe = DAffine3::from_translation(DVec3::new((from + to) / 2.0, 0.0, 0.0));
     scene.probe.depth = 60.0;
     scene.simulation.min_weight = 1e-12;
-    scene.meshes.push(tube());
+    scene.meshes.push(tube().into());
     scene.instances.push(Instance {
         name: "cylinder".into(),
         mesh: 0,

@@ -61,7 +61,7 @@ pub fn add_body(scene: &mut Scene, mesh: Mesh, tissue: Tissue, at: DAffine3) {
         world_from_object: at,
         surface: [mirror(); 2],
     });
-    scene.meshes.push(mesh);
+    scene.meshes.push(mesh.into());
     scene.tissues.push(tissue);
 }
 

@@ -58,7 +58,7 @@ fn limb(subdivisions: u32, distance: f64, strategy: Strategy) -> Result<Scene> {
     scene.graph = Graph::default();
     let first = scene.meshes.len();
     let rest = shapes::ellipsoid(LIMB, subdivisions);
-    scene.meshes.extend((0..KEYFRAMES).map(|k| placed(&rest, k, distance)));
+    scene.meshes.extend((0..KEYFRAMES).map(|k| placed(&rest, k, distance).into()));
     limb.keyframes = Keyframes {
         meshes: (first..first + KEYFRAMES).collect(),
         strategy,
@@ -301,7 +301,7 @@ fn ratio(scene: &Scene) -> f64 {
         x * y + y * z + z * x
     };
     let limb = scene.meshes.iter().rev().take(KEYFRAMES);
-    let boxes: Vec<_> = limb.map(Mesh::bounds).collect();
+    let boxes: Vec<_> = limb.map(|mesh| mesh.bounds()).collect();
     let union = boxes.iter().copied().reduce(|[a, b], [c, d]| {
         let pick =
             |f: fn(f32, f32) -> f32, p: [f32; 3], q: [f32; 3]| [0, 1, 2].map(|i| f(p[i], q[i]));

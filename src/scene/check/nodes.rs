@@ -89,6 +89,8 @@ fn shaped(scene: &Scene, instance: &Instance) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use crate::scene::Scene;
     use crate::scene::shapes;
 
@@ -128,7 +130,7 @@ mod tests {
         );
         let mut keyframes = |other| {
             scene.meshes.truncate(1);
-            scene.meshes.push(other);
+            scene.meshes.push(Arc::new(other));
             scene.instances[0].keyframes.meshes = vec![0, 1];
             super::describe(&scene)[3].clone()
         };

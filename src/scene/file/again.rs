@@ -34,8 +34,8 @@ impl SceneFile {
     }
 
     /// The shape of the mesh that the text calls `name`, whose table then says no `file`.
-    pub fn give(&mut self, name: &str, mesh: Mesh) {
-        self.source.given.insert(name.to_owned(), Arc::new(mesh));
+    pub fn give(&mut self, name: &str, mesh: Arc<Mesh>) {
+        self.source.given.insert(name.to_owned(), mesh);
     }
 
     /// The value that text or entries state at a path, as TOML writes it; none where they state none.

@@ -2,6 +2,7 @@
 
 use std::collections::HashSet;
 use std::ops::Range;
+use std::sync::Arc;
 
 use glam::DAffine3;
 
@@ -47,7 +48,7 @@ pub(super) struct Placed {
 /// The meshes and instances of all mesh tables.
 #[derive(Default)]
 pub(super) struct Anatomy {
-    pub meshes: Vec<Mesh>,
+    pub meshes: Vec<Arc<Mesh>>,
     /// Instances, each placed in its parent at rest.
     pub instances: Vec<Instance>,
     /// For each table its instances.

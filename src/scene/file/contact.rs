@@ -1,5 +1,7 @@
 //! The table `contact`.
 
+use std::sync::Arc;
+
 use super::document::Document;
 use super::error::SceneError;
 use super::fusion::closed_mesh;
@@ -35,7 +37,7 @@ group! {
 pub(super) fn build(
     document: &Document<'_>,
     table: Option<&Table<ContactKeys>>,
-    meshes: &[Mesh],
+    meshes: &[Arc<Mesh>],
     instances: &[Instance],
     tissues: &mut Tissues<'_>,
 ) -> Result<Option<Contact>, SceneError> {

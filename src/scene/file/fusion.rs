@@ -183,7 +183,7 @@ pub(super) fn fusion(
     document: &Document<'_>,
     table: Option<&Table<Fusion>>,
     has_volume: bool,
-    meshes: &[Mesh],
+    meshes: &[Arc<Mesh>],
     instances: &[Instance],
 ) -> Result<Option<Fusion>, SceneError> {
     let Some(Table { stated, .. }) = table else {
@@ -228,7 +228,7 @@ pub(super) fn closed_mesh(
     path: &str,
     name: &str,
     what: &str,
-    meshes: &[Mesh],
+    meshes: &[Arc<Mesh>],
     instances: &[Instance],
 ) -> Result<usize, SceneError> {
     let Some(index) = instances.iter().position(|i| i.name == name) else {

@@ -3,6 +3,7 @@
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use super::document::Document;
 use super::error::SceneError;
@@ -77,7 +78,7 @@ group! {
 #[derive(Default)]
 pub(super) struct Shelf {
     /// All meshes.
-    pub meshes: Vec<Mesh>,
+    pub meshes: Vec<Arc<Mesh>>,
     /// Triangles of all of them.
     triangles: usize,
     /// For files that have been read: with which options, and their indices among the meshes.
@@ -201,7 +202,7 @@ impl Shelf {
     /// Stores a mesh and returns its number.
     pub fn add(&mut self, name: &str, mesh: Mesh) -> usize {
         self.triangles += mesh.triangles.len();
-        self.meshes.push(Mesh { name: name.to_owned(), ..mesh });
+        self.meshes.push(Arc::new(Mesh { name: name.to_owned(), ..mesh }));
         self.meshes.len() - 1
     }
 

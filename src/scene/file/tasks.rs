@@ -1,5 +1,7 @@
 //! The tables `task`: what a learner is to do in the scene.
 
+use std::sync::Arc;
+
 use super::document::Document;
 use super::error::SceneError;
 use super::fusion::closed_mesh;
@@ -129,7 +131,7 @@ pub(super) fn build(
     document: &Document<'_>,
     file: &File,
     poses: &[NamedPose],
-    meshes: &[Mesh],
+    meshes: &[Arc<Mesh>],
     instances: &[Instance],
 ) -> Result<Vec<Task>, SceneError> {
     let mut tasks: Vec<Task> = Vec::new();
@@ -244,7 +246,7 @@ fn mesh(place: &Place<'_>, name: &str, instances: &[Instance]) -> Result<usize, 
 fn measurement(
     place: &Place<'_>,
     keys: &TaskKeys,
-    meshes: &[Mesh],
+    meshes: &[Arc<Mesh>],
     instances: &[Instance],
 ) -> Result<Measurement, SceneError> {
     let (value, unit) = match (keys.value, &keys.mesh[..]) {

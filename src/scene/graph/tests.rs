@@ -1,3 +1,5 @@
+use std::sync::Arc;
+
 use glam::{DAffine3, DQuat, DVec3};
 
 use super::*;
@@ -20,7 +22,7 @@ fn instance(keyframes: &[usize]) -> Instance {
 
 fn scene(instances: Vec<Instance>, nodes: Vec<Node>) -> Scene {
     Scene {
-        meshes: vec![Mesh::default(); 8],
+        meshes: vec![Arc::default(); 8],
         instances,
         graph: Graph { nodes, ..Graph::default() },
         ..Scene::homogeneous(Tissue::shipped("water").expect("shipped"), Probe::abdominal())
@@ -153,7 +155,7 @@ fn topology_is_shared_where_triangles_and_vertex_counts_agree() {
     for (other, shared) in
         [(of(&[[0, 1, 2]], 3), true), (of(&[[0, 2, 1]], 3), false), (of(&[[0, 1, 2]], 4), false)]
     {
-        scene.meshes = vec![of(&[[0, 1, 2]], 3), other];
+        scene.meshes = vec![of(&[[0, 1, 2]], 3).into(), other.into()];
         assert_eq!(scene.shares_topology(&scene.instances[0]), shared);
     }
 }

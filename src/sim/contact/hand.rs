@@ -1,10 +1,12 @@
 //! The probe on the skin: the place that a ray meets, and the pose that slides there.
 
+use std::sync::Arc;
+
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 
 use super::{Skin, Skins};
 use crate::probe::Probe;
-use crate::scene::{Mesh, Scene};
+use crate::scene::Scene;
 
 /// Depth to which a probe put on the skin is pressed in, mm.
 pub const PRESS: f64 = 1.5;
@@ -36,7 +38,7 @@ impl Body {
         let meshes = scene.meshes.iter().enumerate();
         let meshes = meshes.map(|(i, mesh)| match used.contains(&i) {
             true => mesh.clone(),
-            false => Mesh::default(),
+            false => Arc::default(),
         });
         Some(Self {
             scene: Scene {

@@ -1,3 +1,5 @@
+use std::sync::Arc;
+
 use glam::{DMat3, DQuat};
 
 use super::*;
@@ -17,7 +19,7 @@ fn add(scene: &mut Scene, mesh: Mesh, at: DAffine3, displaced: impl Fn(DVec3) ->
         *p = (old + displaced(old)).as_vec3().to_array();
     }
     let first = scene.meshes.len();
-    scene.meshes.extend([mesh, moved]);
+    scene.meshes.extend([mesh, moved].map(Arc::new));
     scene.instances.push(Instance {
         name: "moving".into(),
         mesh: first,
@@ -86,7 +88,7 @@ fn shell_errors(grouped: bool) -> [f64; 2] {
     add(&mut scene, shapes::sphere(10.0, 3), DAffine3::IDENTITY, shrink);
     add(&mut scene, shapes::sphere(18.0, 4), DAffine3::IDENTITY, |_| DVec3::ZERO);
     // The outer sphere moves by a negligible amount: if it did not move, it would have no field.
-    scene.meshes[3].positions[0][0] += 1e-6;
+    Arc::make_mut(&mut scene.meshes[3]).positions[0][0] += 1e-6;
     if !grouped {
         scene.instances[0].keyframes.group = None;
     }
@@ -126,7 +128,7 @@ fn offsets_follow_keyframes_strategies_and_settings() {
     add(&mut scene, cube(), DAffine3::IDENTITY, |_| DVec3::ZERO);
     add(&mut scene, cube(), DAffine3::IDENTITY, |p| 0.2 * p);
     add(&mut scene, cube(), DAffine3::IDENTITY, |p| 0.1 * p);
-    scene.meshes[5].triangles.pop();
+    Arc::make_mut(&mut scene.meshes[5]).triangles.pop();
     scene.instances[3].keyframes.strategy = Strategy::Interpolate;
     let fields = Fields::build(&scene);
     let offsets = |scene: &Scene| [0, 1, 2, 3].map(|i| fields.offset(scene, i));

@@ -361,7 +361,7 @@ impl GeometryArrays {
 
     /// Room for any keyframe of `instance`.
     fn reserve(&mut self, scene: &Scene, instance: &Instance) -> GeometryRange {
-        let meshes = instance.keyframes.meshes.iter().map(|&m| &scene.meshes[m]);
+        let meshes = instance.keyframes.meshes.iter().map(|&m| &*scene.meshes[m]);
         let most = |size: fn(&Mesh) -> usize| meshes.clone().map(size).max().unwrap_or(0);
         let (vertices, triangles) = (most(|m| m.positions.len()), most(|m| m.triangles.len()));
         let place = GeometryRange {

@@ -156,7 +156,7 @@ fn build_meshes(
     sets: &SharingSets,
 ) -> Result<Vec<Option<Blas>>, GpuError> {
     let all = || scene.meshes.iter().zip(needs(scene, sets));
-    let walked = |(mesh, need): &(&crate::scene::Mesh, Residency)| {
+    let walked = |(mesh, need): &(&Arc<crate::scene::Mesh>, Residency)| {
         *need == Residency::Structure && !mesh.triangles.is_empty()
     };
     let inputs: Vec<BlasInput<'_>> = all()

@@ -212,7 +212,7 @@ mod tests {
             world_from_object: DAffine3::from_translation(DVec3::new(at, 0.0, 40.0)),
             surface: [Tissue::shipped("liver").expect("shipped").surface; 2],
         };
-        scene.meshes = vec![shapes::sphere(50.0, 2), shapes::sphere(5.0, 1)];
+        scene.meshes = vec![shapes::sphere(50.0, 2).into(), shapes::sphere(5.0, 1).into()];
         scene.instances = vec![
             template(0, 3, 0.0),
             template(1, 1, -9.0),
