@@ -174,8 +174,9 @@ impl Simulator {
         let world = World::with_splits(device, &shapers, scene, tracer, splits)?;
         let coincident = scene.coincident_triangles() > 0;
         let budget = FrameBudget::of(device);
-        let (frame, batches) = frame_constants(scene, &world, coincident, &budget, None);
         let tables = Tables::new(scene);
+        let constants = tables.frame(scene);
+        let (frame, batches) = frame_constants(constants, &world, coincident, &budget, None);
         let lane = Lane::new(device, scene, batches.sizes(&frame, &tables), None)?;
         let simulator = Self {
             device: Arc::clone(device),

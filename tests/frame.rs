@@ -10,8 +10,9 @@ use std::sync::Arc;
 use insonify::gpu::{Device, test_device};
 use insonify::scene::Scene;
 use insonify::sim::bvh::Splits;
+use insonify::sim::layout::Frame;
 use insonify::sim::shaders::Library;
-use insonify::sim::{Simulator, Tracer};
+use insonify::sim::{Simulator, Tracer, tables};
 use shared_data::shared_data;
 
 /// A scene at a size that a software driver renders in seconds.
@@ -123,6 +124,34 @@ fn changed_settings_take_effect_from_frame_to_frame() {
     };
     assert!(first != changed.echoes, "a change is noticed");
     assert!(changed == shoot(&device, &after, Tracer::Bvh));
+}
+
+/// Scales are bounds over all depths and kept from frame to frame: until any setting from which they follow is another.
+#[test]
+fn scales_are_those_of_the_scene_as_it_is() {
+    let mut scene = small("scenes/phantom.toml");
+    (scene.probe.scanlines, scene.probe.samples) = (16, 256);
+    let mut simulator = Simulator::new(&test_device(), &Library::embedded(), &scene, Tracer::Bvh)
+        .expect("a simulator");
+    let scales = |frame: &Frame| [frame.surface_scale, frame.volume_scale];
+    let mut before = scales(&tables::frame(&scene, 0));
+    let changes: [fn(&mut Scene); 5] = [
+        |_| (),
+        |scene| scene.simulation.surface_gain += 60.0,
+        |scene| scene.instances.iter_mut().for_each(|i| i.surface[1].gain += 20.0),
+        |scene| scene.tissues[0].echogenicity += 60.0,
+        |scene| scene.wires.iter_mut().for_each(|wire| wire.amplitude *= 1e6),
+    ];
+    for (number, change) in changes.into_iter().enumerate() {
+        change(&mut scene);
+        let now = scales(&tables::frame(&scene, 0));
+        assert!(number == 0 || now != before, "change {number} is one of the scales");
+        simulator.frame(&scene, 0).expect("a frame");
+        assert_eq!(scales(simulator.constants()), now, "change {number}");
+        simulator.line(&scene, 1, 3, 20).expect("a line");
+        assert_eq!(scales(simulator.constants()), now, "change {number}, a line");
+        before = now;
+    }
 }
 
 /// Without a least weight paths end at the image's end: the same frame as with a tiny one.

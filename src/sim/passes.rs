@@ -12,7 +12,7 @@ use super::pass::{Extent, Pass, Sizes, Variants};
 use super::shaders::Library;
 use super::stages::{self, CONVERT, DARKEN, EXPECT, FUSE, MASK, ORIGIN, SCATTER, SHADOW, TRACE};
 use super::tables::Tables;
-use super::{SimError, World, layout, tables};
+use super::{SimError, World, layout};
 use crate::gpu::{Binding, Buffer, Commands, Device, GpuError, Kernel, Stage};
 use crate::scene::Scene;
 use crate::settings::Blend;
@@ -84,7 +84,7 @@ impl Passes {
         };
         let frame;
         (frame, self.batches) =
-            frame_constants(scene, &self.world, coincident, &budget, line.as_ref());
+            frame_constants(tables.frame(scene), &self.world, coincident, &budget, line.as_ref());
         if labelled && self.last.is_none() {
             self.world.remember(cmd)?;
         }
@@ -347,15 +347,14 @@ impl PassKernels {
     }
 }
 
-/// The frame's constants, including those that depend on the world and on the room for segments.
+/// A frame's constants with those that depend on the world and on the room for segments.
 pub(super) fn frame_constants(
-    scene: &Scene,
+    mut frame: layout::Frame,
     world: &World,
     coincident: bool,
     budget: &FrameBudget,
     line: Option<&OneLine>,
 ) -> (layout::Frame, Batches) {
-    let mut frame = tables::frame(scene, 0);
     if let Some(line) = line {
         line.narrow(&mut frame);
     }

@@ -17,8 +17,9 @@ impl Simulator {
     pub fn fit(&mut self, scene: &Scene) -> Result<bool, SimError> {
         let world = &self.passes.world;
         let budget = FrameBudget::of(&self.device);
-        let (frame, batches) = frame_constants(scene, world, self.coincident, &budget, None);
         let tables = Tables::new(scene);
+        let constants = tables.frame(scene);
+        let (frame, batches) = frame_constants(constants, world, self.coincident, &budget, None);
         let sizes = batches.sizes(&frame, &tables);
         if self.passes.lanes[0].buffers.hold(&sizes) {
             return Ok(false);
@@ -47,6 +48,5 @@ impl Simulator {
 
 /// Width and height of a scene's B-mode image, pixels.
 pub fn image_size(scene: &Scene) -> [u32; 2] {
-    let frame = super::tables::frame(scene, 0);
-    [frame.image_width, frame.image_height]
+    super::tables::raster(scene).0
 }

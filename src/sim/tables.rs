@@ -27,6 +27,24 @@ fn finite_or_zero(x: f64) -> f32 {
 /// The constants of frame `frame_index`, without the flag of coincident surfaces,
 /// which depends on triangles, and the segments that a line may hold, which depend on the buffers.
 pub fn frame(scene: &Scene, frame_index: u32) -> layout::Frame {
+    constants(scene, frame_index, Calibration::new(scene).scales())
+}
+
+/// Width and height of a scene's image, pixels, and the edge of a pixel, mm.
+pub(super) fn raster(scene: &Scene) -> ([u32; 2], f64) {
+    let [left, top, right, bottom] = scene.probe.bounds();
+    let height = scene.imaging.image_height.max(1);
+    let pitch = (bottom - top) / f64::from(height);
+    let width = ((right - left) / pitch).ceil().max(1.0);
+    ([width as u32, height], pitch)
+}
+
+/// [`frame`] with scales that are known.
+fn constants(
+    scene: &Scene,
+    frame_index: u32,
+    (surface_scale, volume_scale): (f64, f64),
+) -> layout::Frame {
     let calibration = Calibration::new(scene);
     let (probe, simulation, imaging) = (&scene.probe, &scene.simulation, &scene.imaging);
     let (kind, radius, field_of_view, width) = match probe.kind {
@@ -35,10 +53,8 @@ pub fn frame(scene: &Scene, frame_index: u32) -> layout::Frame {
         Kind::Phased { field_of_view } => (layout::KIND_PHASED, 0.0, field_of_view, 0.0),
     };
     let flag = |on: bool, flag: u32| if on { flag } else { 0 };
-    let [left, top, right, bottom] = probe.bounds();
-    let pixel_pitch = (bottom - top) / f64::from(imaging.image_height.max(1));
-    let image_width = ((right - left) / pixel_pitch).ceil().max(1.0);
-    let (surface_scale, volume_scale) = calibration.scales();
+    let ([image_width, image_height], pixel_pitch) = raster(scene);
+    let [_, top, ..] = probe.bounds();
     layout::Frame {
         world_from_probe: matrix_rows(&scene.world_from_probe),
         probe_from_world: matrix_rows(&scene.world_from_probe.inverse()),
@@ -94,10 +110,10 @@ pub fn frame(scene: &Scene, frame_index: u32) -> layout::Frame {
         inverse_reference: calibration.display_gain() as f32,
         inverse_range: imaging.dynamic_range.recip() as f32,
         frame_index,
-        image_width: image_width as u32,
-        image_height: imaging.image_height.max(1),
+        image_width,
+        image_height,
         pixel_pitch: pixel_pitch as f32,
-        image_left: (-image_width * pixel_pitch / 2.0) as f32,
+        image_left: (-f64::from(image_width) * pixel_pitch / 2.0) as f32,
         image_top: top as f32,
         ..layout::Frame::default()
     }
@@ -119,6 +135,8 @@ pub struct Tables {
     pub grey: Vec<u32>,
     /// Expected power of speckle, by sample and layer; empty where labels have no levels.
     pub speckle: Vec<f32>,
+    /// [`Calibration::scales`]: bounds over all depths, which take longer than all else of a frame's constants.
+    scales: (f64, f64),
 }
 
 impl Tables {
@@ -132,7 +150,13 @@ impl Tables {
             points: with_spheres(points(scene)),
             grey: grey_map(&scene.imaging),
             speckle: if scene.simulation.levelled() { speckle(scene) } else { Vec::new() },
+            scales: Calibration::new(scene).scales(),
         }
+    }
+
+    /// [`frame`] 0 of `scene`, which has the settings that these are the tables of.
+    pub(super) fn frame(&self, scene: &Scene) -> layout::Frame {
+        constants(scene, 0, self.scales)
     }
 
     /// Names of the buffers that the tables fill, with their content. Tissues are not among them: their seeds may be
