@@ -1,6 +1,11 @@
 //! Elements that do not touch the skin neither send nor receive: closed forms of which elements these are, and of
 //! the remaining brightness of a scanline, by both tracers.
 
+#[path = "common/skip.rs"]
+mod skip;
+#[path = "common/tracers.rs"]
+mod tracers;
+
 use std::path::Path;
 use std::sync::Arc;
 
@@ -10,8 +15,7 @@ use insonify::scene::Scene;
 use insonify::sim::contact::{Coupling, Skins, table};
 use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer};
-
-const TRACERS: [Tracer; 2] = [Tracer::Bvh, Tracer::RayQuery];
+use tracers::tracers;
 
 /// Scatterers everywhere, no noise, a linear probe of 38 mm and 96 scanlines.
 const BENCH: &str = r#"
@@ -83,7 +87,7 @@ fn columns_whose_gap_exceeds_the_gel_are_dark_and_the_others_as_they_were() {
         scene
     };
     let border = |gel: f64| gel / angle.tan() / 38.0 * 96.0;
-    for tracer in TRACERS {
+    for tracer in tracers(&device) {
         let free = {
             let mut scene = narrow(3.0);
             scene.contact = None;
@@ -124,7 +128,7 @@ fn a_line_keeps_the_coupled_shares_of_what_sends_and_of_what_receives() {
     };
     let pitch = width / 96.0;
     let transmit = with.probe.focus / with.probe.f_number_transmit;
-    for tracer in TRACERS {
+    for tracer in tracers(&device) {
         let (seen, free) = (lines(&device, &with, tracer), lines(&device, &without, tracer));
         let worst = |receives: bool| {
             let mut worst = 0.0_f64;
@@ -195,7 +199,7 @@ fn on_a_sphere_the_coupled_elements_and_the_depth_are_those_of_the_closed_form()
 #[test]
 fn lifted_off_there_is_nothing_but_noise() {
     let device = test_device();
-    for tracer in TRACERS {
+    for tracer in tracers(&device) {
         let mut lifted = rocked(0.0, 3.0);
         lifted.imaging.noise = -80.0;
         lifted.world_from_probe.translation.z = -3.1;
@@ -237,7 +241,7 @@ fn above_a_slab(background: &str, couplant: &str) -> Scene {
 #[test]
 fn the_gap_is_filled_by_the_couplant_and_behind_the_body_is_the_background() {
     let device = test_device();
-    for tracer in TRACERS {
+    for tracer in tracers(&device) {
         let heard = |background: &str, couplant: &str| {
             let scene = above_a_slab(background, couplant);
             let pitch = scene.probe.sample_pitch();
@@ -391,7 +395,7 @@ fn shipped_scenes_are_in_full_contact_and_look_as_without_it() {
     let scene = load("abdomen");
     let mut without = scene.clone();
     without.contact = None;
-    for tracer in TRACERS {
+    for tracer in tracers(&device) {
         assert!(lines(&device, &scene, tracer) == lines(&device, &without, tracer));
     }
 }

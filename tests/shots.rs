@@ -1,5 +1,10 @@
 //! Several images of one frame: each is what it is alone.
 
+#[path = "common/skip.rs"]
+mod skip;
+#[path = "common/tracers.rs"]
+mod tracers;
+
 use std::path::Path;
 
 use glam::{DAffine3, DVec3};
@@ -7,6 +12,7 @@ use insonify::gpu::test_device;
 use insonify::scene::Scene;
 use insonify::sim::shaders::Library;
 use insonify::sim::{Shot, Simulator, Tracer};
+use tracers::tracers;
 
 /// A shipped scene with few lines.
 fn scene(name: &str, more: &[(&str, &str)]) -> Scene {
@@ -112,7 +118,7 @@ fn in_two(simulator: &mut Simulator, scene: &Scene, shots: &[Shot]) -> Vec<Resul
 
 #[test]
 fn images_beside_each_other_are_those_one_after_the_other() {
-    for tracer in [Tracer::Bvh, Tracer::RayQuery] {
+    for tracer in tracers(&test_device()) {
         // Contact with the skin, a deforming organ; several batches of paths, each with random numbers of its own.
         compare(&scene("abdomen.toml", &[("simulation.labels", "true")]), tracer);
         let mut heart = scene("heart.toml", &[("simulation.rough_transmission", "true")]);

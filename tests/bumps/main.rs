@@ -6,4 +6,8 @@ mod patient;
 mod phantom;
 #[path = "../common/shared_data.rs"]
 mod shared;
+#[path = "../common/tracers.rs"]
+mod tracers;
 mod vessels;
+
+use shared::skip;

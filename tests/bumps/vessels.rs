@@ -10,6 +10,7 @@ use insonify::sim::{Simulator, Tracer};
 
 use crate::lumen::{LEAST, dark, levels, share, unrefracted};
 use crate::phantom::{Random, along_y, block, bumps, layers, place, tissue, with};
+use crate::tracers::tracers;
 
 /// Depth of the bumpy surface, mm.
 const TOP: f64 = 15.0;
@@ -153,7 +154,7 @@ fn is_sound(all: &[&Seen]) -> bool {
 /// Local normals are the planted error: they cut vessels off along scanlines.
 #[test]
 fn bumps_smaller_than_the_beam_do_not_tear_vessels() {
-    let tracers = [Tracer::Bvh, Tracer::RayQuery].into_iter().cycle();
+    let tracers = tracers(&test_device()).into_iter().cycle();
     let all: Vec<[Seen; 2]> = BUMPS.into_iter().zip(tracers).map(|(b, t)| seen(b, t)).collect();
     for ([rms, shortest, longest], [beam, ray]) in BUMPS.into_iter().zip(&all) {
         println!(

@@ -9,6 +9,8 @@ use insonify::scene::Scene;
 use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer};
 
+use super::tracers::tracers;
+
 /// A ball that swings and a block of its own, in a volume that brightens to one side.
 const SCENE: &str = r#"
 background = "liver"
@@ -98,7 +100,7 @@ fn a_change_between_frames_is_as_if_the_file_had_said_it() {
         &[("volume.translate", "[4, 0, -2]"), ("volume.scale", "0.9"), ("volume.white", "120")],
         &[("fusion.mask", "[\"block\", \"plate\"]")],
     ];
-    for tracer in [Tracer::Bvh, Tracer::RayQuery] {
+    for tracer in tracers(&device) {
         let plain = at(&[]);
         let simulator = Simulator::new(&device, &Library::embedded(), &plain, tracer);
         let mut simulator = simulator.expect("a simulator");

@@ -11,6 +11,10 @@ mod live;
 mod mistakes;
 #[path = "../common/program.rs"]
 mod program;
+#[path = "../common/skip.rs"]
+mod skip;
+#[path = "../common/tracers.rs"]
+mod tracers;
 
 use case::{Case, SCENE, apex, model, obj, vtp_in_ras};
 
