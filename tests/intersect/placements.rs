@@ -1,13 +1,15 @@
 //! Placements: transforms, the order of instances, and movement.
 
 use glam::{DAffine3, DVec3};
+use insonify::gpu::test_device;
 use insonify::scene::shapes;
 use rayon::prelude::*;
 
 use super::device::Rig;
 use super::rays::{Ray, aimed_at_seams, baked, placement, rays, scene};
+use super::shape;
+use super::tracers::tracers;
 use super::walk::{clear_hits, walk};
-use super::{TRACERS, shape};
 
 fn away_from_seams(rays: Vec<Ray>) -> Vec<Ray> {
     rays.into_iter().enumerate().filter(|(i, _)| !aimed_at_seams(*i)).map(|(_, ray)| ray).collect()
@@ -32,7 +34,7 @@ fn placements_are_transforms_of_the_mesh() {
         let flat = scene(vec![(baked(&mesh, &world_from_object), DAffine3::IDENTITY)]);
         let centre = world_from_object.translation;
         let rays = away_from_seams(rays(&placed, 20_000, 31));
-        for tracer in TRACERS {
+        for tracer in tracers(&test_device()) {
             let [a, b] = [&placed, &flat].map(|scene| Rig::new(scene, tracer).trace(&rays));
             let mut compared = 0;
             for ((ray, a), b) in rays.iter().zip(&a).zip(&b) {
@@ -80,7 +82,7 @@ fn the_order_of_instances_changes_no_hit() {
     let rays = away_from_seams(rays(&base, 8_000, 32));
     let exact: Vec<_> =
         rays.par_iter().map(|ray| clear_hits(&base, ray, 4.0 * MARGIN, twins)).collect();
-    for tracer in TRACERS {
+    for tracer in tracers(&test_device()) {
         let mut clear = 0;
         let walked: Vec<_> = orders
             .iter()
@@ -142,7 +144,7 @@ fn instances_move() {
     let mut after = before.clone();
     after.instances[1].world_from_object.translation += DVec3::new(25.0, 10.0, -15.0);
     let rays = rays(&after, 5_000, 2);
-    for tracer in TRACERS {
+    for tracer in tracers(&test_device()) {
         let mut rig = Rig::new(&before, tracer);
         assert!(!rig.update(&before), "{tracer}: nothing moved");
         assert!(rig.update(&after));
