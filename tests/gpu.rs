@@ -17,6 +17,8 @@ mod dynamic;
 mod sheet;
 #[path = "common/skip.rs"]
 mod skip;
+#[path = "common/timestamps.rs"]
+mod timestamps;
 
 /// Group size of `add.comp` in these tests; not its default.
 const ADD_GROUP: u32 = 32;

@@ -8,6 +8,7 @@ use insonify::gpu::{
 };
 
 use super::skip::{Lacking, skip};
+use super::timestamps::timestamps;
 use super::{assert_clean, words};
 
 const ONE: [[u32; 3]; 1] = [[0, 1, 2]];
@@ -62,11 +63,13 @@ impl Rays {
         commands.dispatch(&self.kernel, [2, 1, 1], bytemuck::bytes_of(&2_u32), &bindings)
     }
 
-    /// Distance, custom index and triangle of the middle ray's hit; the other must miss.
+    /// Distance, custom index and triangle of the middle ray's hit; the other must miss. Vulkan does not say how exact a
+    /// distance is: it is rounded to hundredths, far less than what lies between any two triangles here.
     fn hit(&self, device: &Arc<Device>) -> [f32; 3] {
         let hits = device.read_back_as::<[f32; 4]>(&self.hits).unwrap();
         assert_eq!(hits[1], [-1.0; 4]);
-        [hits[0][0], hits[0][1], hits[0][2]]
+        let [t, index, triangle, _] = hits[0];
+        [(t * 1e2).round() / 1e2, index, triangle]
     }
 }
 
@@ -103,7 +106,6 @@ fn keyframes_are_swapped_by_rebuild_and_by_refit() {
             .unwrap();
         rays.hit(&device)
     };
-    // Exact: small whole numbers, and the transform only shifts.
     assert_eq!(trace(&mut tlas, 0, 0.0, false), [20.0, 70_000.0, 0.0]);
     assert_eq!(trace(&mut tlas, 1, 0.0, false), [50.0, 70_001.0, 0.0]);
     assert_eq!(trace(&mut tlas, 0, 5.0, true), [25.0, 70_000.0, 0.0]);
@@ -287,12 +289,19 @@ fn structures_are_built_and_timed_without_ray_queries() {
     let small = build_times(&device, &[few], loose).unwrap();
     let changing = refit_times(&device, &[many, few], false).unwrap();
     println!("{compacted:?}\n{large:?}\n{small:?}\n{changing:?}");
-    assert!(compacted.build_ms > 0.0 && compacted.compact_ms > 0.0);
     assert!(compacted.compacted_bytes <= compacted.bytes);
     assert_eq!((large.compact_ms, large.compacted_bytes), (0.0, large.bytes));
-    // Five thousand times the triangles, so that the time is that of the build.
-    assert!(large.build_ms > 3.0 * small.build_ms && large.bytes > 1000 * small.bytes);
-    assert!(changing.build_ms > 0.0 && changing.refit_ms > 0.0 && changing.bytes > large.bytes);
+    // Five thousand times the triangles; what is there for any number of them counts in the small one.
+    assert!(large.bytes > 100 * small.bytes && changing.bytes > large.bytes);
+    if timestamps(&device) {
+        assert!(compacted.build_ms > 0.0 && compacted.compact_ms > 0.0);
+        assert!(changing.build_ms > 0.0 && changing.refit_ms > 0.0);
+        // The time is that of the build.
+        assert!(large.build_ms > small.build_ms);
+    } else {
+        let untimed = [compacted.build_ms, small.build_ms, changing.build_ms, changing.refit_ms];
+        assert!(untimed.iter().all(|ms| ms.is_nan()), "{untimed:?}");
+    }
 
     // Top levels and meshes that change need no ray queries either.
     let blas = Blas::build_many(&device, &[few], BlasOptions::default()).unwrap();

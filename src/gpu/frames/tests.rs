@@ -2,6 +2,7 @@ use ash::vk;
 
 use super::{QueueUser, SubmissionSlot};
 use crate::gpu::{Commands, GpuError, lone_test_device};
+use crate::skip::{Lacking, skip};
 
 #[test]
 fn stages_in_many_batches_are_timed_and_so_is_what_follows() {
@@ -18,9 +19,13 @@ fn stages_in_many_batches_are_timed_and_so_is_what_follows() {
     // SAFETY: the device is alive.
     unsafe { device.raw.device_wait_idle() }.unwrap();
     let times = slot.timer.collect().unwrap();
+    assert!(device.validation_messages().is_empty());
+    if device.timestamp_bits == 0 {
+        assert_eq!(times, []);
+        return skip(Lacking::Tool, &format!("'{}' has no timestamps", device.name()));
+    }
     let [trace, beam] = ["trace", "beam"].map(|n| times.iter().filter(|t| t.0 == n).count());
     assert!(trace > 100 && beam == 1, "{trace} {beam}");
-    assert!(device.validation_messages().is_empty());
 }
 
 /// No driver at hand can be made to lose its device, so the code is planted.
