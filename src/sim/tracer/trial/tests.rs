@@ -1,4 +1,4 @@
-//! The trial on the software driver's ray query, and on results that are wrong.
+//! The trial on the device's ray query, and on results that are wrong.
 
 use std::sync::Arc;
 
@@ -9,6 +9,7 @@ use crate::gpu::test_device;
 use crate::scene::Scene;
 use crate::sim::layout::NONE;
 use crate::sim::shaders::Library;
+use crate::sim::tracer::tried;
 use crate::skip::{Lacking, skip};
 
 fn hit(instance: u32, t: f32) -> RayHit {
@@ -25,8 +26,14 @@ fn the_ray_query_finds_the_surfaces_of_a_scene() {
     let (scene, _) = Scene::load("scenes/phantom.toml".as_ref(), &[]).unwrap();
     let trial = Trial::run(&device, &library, &scene).unwrap();
     assert!(trial.rays > 3000, "{trial:?}");
-    assert!(trial.passed(), "{trial:?}");
     assert_eq!(device.validation_messages(), [""; 0]);
+    let verdict = tried(&device, &library, &scene);
+    assert_eq!(verdict.is_ok(), trial.passed(), "{trial:?}");
+    if let Err(why) = verdict {
+        // A fault of the driver, for which there is the trial.
+        assert!(why.contains(&format!("on {} of {} rays", trial.different, trial.rays)), "{why}");
+        skip(Lacking::Tool, &format!("the ray query of '{}' {why}", device.name()));
+    }
 }
 
 #[test]
