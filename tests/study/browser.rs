@@ -1,6 +1,6 @@
 //! A real browser, driven through chromedriver (W3C WebDriver, the part that the tests need).
 
-use std::io::{BufRead as _, BufReader};
+use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -33,8 +33,34 @@ fn found(names: &[&str]) -> Option<PathBuf> {
     all.into_iter().find(|file| file.is_file())
 }
 
+/// Starts chromedriver; returns it and its address. The port is chosen here, since not every version tells which one it
+/// has found itself; where another program has taken it meanwhile the driver ends and another port is tried.
+fn driver(program: &Path, agent: &Agent) -> (Child, String) {
+    for _ in 0..5 {
+        let free = TcpListener::bind("127.0.0.1:0").and_then(|port| port.local_addr());
+        let free = free.expect("a free port");
+        let address = format!("http://{free}");
+        let mut driver = Command::new(program)
+            .arg(format!("--port={}", free.port()))
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("chromedriver starts");
+        let begun = Instant::now();
+        while driver.try_wait().expect("a child").is_none() {
+            let status = agent.get(format!("{address}/status")).call();
+            if status.is_ok_and(|answer| answer.status().is_success()) {
+                return (driver, address);
+            }
+            assert!(begun.elapsed() < PATIENCE, "chromedriver does not answer at {address}");
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    }
+    panic!("chromedriver ends at once, on five ports")
+}
+
 impl Browser {
-    /// Starts a browser; none, with a message, where there is no Chromium with its driver.
+    /// Starts a browser; none, with a message, where there is no Chromium with a driver that can start it.
     pub fn start() -> Option<Self> {
         let chromium = found(&["chromium", "chromium-browser", "google-chrome"]);
         let (Some(chromium), Some(driver)) = (chromium, found(&["chromedriver"])) else {
@@ -43,28 +69,13 @@ impl Browser {
         };
         let folder = tempfile::tempdir().expect("a folder");
         std::fs::create_dir(folder.path().join("saved")).expect("made");
-        let mut driver = Command::new(driver)
-            .arg("--port=0")
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn()
-            .expect("chromedriver starts");
-        let lines = BufReader::new(driver.stdout.take().expect("piped")).lines();
-        let port = lines.map_while(Result::ok).find_map(|line| {
-            let (_, port) = line.split_once("started successfully on port ")?;
-            port.trim_end_matches('.').parse::<u16>().ok()
-        });
-        let agent = Agent::config_builder()
+        let agent: Agent = Agent::config_builder()
             .http_status_as_error(false)
             .timeout_global(Some(PATIENCE))
-            .build();
-        let port = port.expect("chromedriver tells its port");
-        let mut browser = Self {
-            agent: agent.into(),
-            driver,
-            session: format!("http://127.0.0.1:{port}/session"),
-            folder,
-        };
+            .build()
+            .into();
+        let (driver, address) = self::driver(&driver, &agent);
+        let mut browser = Self { agent, driver, session: format!("{address}/session"), folder };
         let profile = browser.folder.path().join("profile");
         let flags = [
             "--headless",
@@ -83,7 +94,7 @@ impl Browser {
             .into_iter()
             .chain([format!("--user-data-dir={}", profile.display())])
             .collect();
-        let made = browser.post(
+        let made = browser.answer(
             "",
             &json!({ "capabilities": { "alwaysMatch": {
             "browserName": "chrome",
@@ -95,6 +106,17 @@ impl Browser {
             },
         } } }),
         );
+        let made = match made {
+            Ok(made) => made,
+            // Of another version than the driver, or one that cannot run here.
+            Err(error) if error["error"] == "session not created" => {
+                let said = error["message"].as_str().and_then(|text| text.lines().next());
+                let why = said.unwrap_or("session not created");
+                skip(Lacking::Tool, &format!("no chromium that chromedriver can start ({why})"));
+                return None;
+            }
+            Err(error) => panic!("no session: {error}"),
+        };
         let id = made["sessionId"].as_str().expect("a session");
         browser.session = format!("{}/{id}", browser.session);
         Some(browser)
@@ -105,13 +127,18 @@ impl Browser {
         self.folder.path().join("saved")
     }
 
-    /// Posts a command; returns WebDriver's answer.
-    fn post(&self, command: &str, body: &Value) -> Value {
+    /// Posts a command; returns WebDriver's answer, or its error.
+    fn answer(&self, command: &str, body: &Value) -> Result<Value, Value> {
         let url = format!("{}{command}", self.session);
         let mut response = self.agent.post(&url).send_json(body).expect("it answers");
         let mut answer: Value = response.body_mut().read_json().expect("JSON");
-        assert!(response.status().is_success(), "{command} {body}: {answer}");
-        answer["value"].take()
+        let value = answer["value"].take();
+        if response.status().is_success() { Ok(value) } else { Err(value) }
+    }
+
+    /// Posts a command that has to succeed; returns WebDriver's answer.
+    fn post(&self, command: &str, body: &Value) -> Value {
+        self.answer(command, body).unwrap_or_else(|error| panic!("{command} {body}: {error}"))
     }
 
     /// Opens a file.
