@@ -508,9 +508,10 @@ fn a_bone_throws_its_shadow_into_a_real_acquired_volume() {
     // middle less.
     let lost = shown - shaded;
     assert!((0.3..0.4).contains(&lost), "{shown} {shaded}");
+    // Where nothing is lost a device may round the logarithm of 1 to 2^-21 of a neper, which is 7e-8 of the range.
     let beside = (0..clear.len()).filter(|at| (at % width).abs_diff(width / 2) > 80);
     for at in beside {
-        assert_eq!(dark[at].to_bits(), clear[at].to_bits(), "{at}");
+        assert!((dark[at] - clear[at]).abs() < 1e-6, "{at}: {} {}", dark[at], clear[at]);
     }
 }
 

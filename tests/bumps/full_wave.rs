@@ -106,7 +106,7 @@ fn wires_behind_bumps_stand_as_in_a_full_wave_simulation() {
     let fluid = &table["cyst"];
     let cyst = of(fluid);
     let mut smooth: Vec<[Spot; 3]> = Vec::new();
-    let (mut wrong, mut planted) = (Vec::new(), 0);
+    let (mut wrong, mut solved, mut planted) = (Vec::new(), Vec::new(), 0);
     for row in table["wires"].as_array().expect("a list") {
         let behind_cyst = row["cyst"].as_bool().expect("true or false");
         let (rms, at) = (number(&row["rms"]), pair(&row["at"]));
@@ -132,8 +132,8 @@ fn wires_behind_bumps_stand_as_in_a_full_wave_simulation() {
         }
         let wire = WIRES.iter().position(|w| *w == at).expect("a wire");
         let first = smooth[wire + if behind_cyst { WIRES.len() } else { 0 }];
-        // Level over that behind the smooth surface.
-        let agree = |own: &Spot, reference: &Spot| {
+        // Most of what may be off, as a share of what is allowed; level is that over the one behind the smooth surface.
+        let off = |own: &Spot, reference: &Spot| {
             let gain = own.level - reference.level - (full.level - first[0].level);
             println!(
                 "{name}: lateral {:.3} depth {:.3} width {:.3} of {:.3}, level {:.2} of {:.2} dB",
@@ -144,16 +144,22 @@ fn wires_behind_bumps_stand_as_in_a_full_wave_simulation() {
                 own.level - reference.level,
                 full.level - first[0].level
             );
-            (own.lateral - full.lateral).abs() < 0.3
-                && (own.depth - full.depth).abs() < 0.3
-                && (own.width / full.width - 1.0).abs() < 0.2
-                && gain.abs() < 2.0
+            let apart = [own.lateral - full.lateral, own.depth - full.depth].map(|d| d / 0.3);
+            let all = [apart[0], apart[1], (own.width / full.width - 1.0) / 0.2, gain / 2.0];
+            let size = |v: f64| if v.is_nan() { f64::INFINITY } else { v.abs() };
+            all.map(size).into_iter().fold(0.0, f64::max)
         };
-        if !agree(&beam, &first[1]) {
+        let (now, known) = (off(&beam, &first[1]), BEHIND_THE_EDGE.contains(&&*name));
+        println!("{name}: {now:.3} of what is allowed");
+        // Those known may lie at the border, where rounding decides.
+        if now >= 1.0 && !known {
             wrong.push(name.clone());
+        } else if now < 0.9 && known {
+            solved.push(name.clone());
         }
-        planted += u32::from(!agree(&ray, &first[2]));
+        planted += u32::from(off(&ray, &first[2]) >= 1.0);
     }
-    assert_eq!(wrong, BEHIND_THE_EDGE);
+    assert_eq!(wrong, [""; 0]);
+    assert_eq!(solved, [""; 0], "no longer wrong: to be taken off the list");
     assert!(planted > 0, "local normals agree");
 }
