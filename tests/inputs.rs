@@ -257,7 +257,8 @@ fn planted_outcomes_are_rejected() {
 fn the_limits_of_memory_and_time_hold() {
     // `tail` keeps its input until a line ends; here none does.
     let hungry = limited("head -c 1200000000 /dev/zero | tail > /dev/null", Path::new("x"));
-    assert_eq!(hungry.code, Some(1), "{}", hungry.text);
+    // Which code says so, each `tail` has its own.
+    assert_ne!(hungry.code, Some(0), "{}", hungry.text);
     assert!(verdict(Path::new("x"), &hungry).is_some());
     let slow = limited("while :; do :; done", Path::new("x"));
     assert!(verdict(Path::new("x"), &slow).is_some(), "{}", slow.text);
