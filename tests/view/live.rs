@@ -3,14 +3,14 @@
 use serde_json::Value;
 
 use super::desk::{Desk, Key};
-use super::tools::sidecar;
+use super::tools::{rendered, sidecar};
 use super::{IMAGE, SCENE, brightness, difference};
 
 #[test]
 fn moving_scenes_are_coarse_and_resting_ones_have_the_scenes_own_quality() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name).to_str().expect("UTF-8").to_owned();
-    let (json, scene, rendered) = (path("times.json"), path("scene.toml"), path("rendered.png"));
+    let json = path("times.json");
     // No device makes an image of a whole scene in a millisecond.
     let budget = "live.budget=\"1 ms\"";
     let captures = folder.path().to_str().expect("UTF-8").to_owned();
@@ -31,16 +31,8 @@ fn moving_scenes_are_coarse_and_resting_ones_have_the_scenes_own_quality() {
     assert_eq!(still["quality"]["level"], 0);
     desk.quit();
 
-    std::fs::write(&scene, SCENE).expect("written");
-    let status = std::process::Command::new(env!("CARGO_BIN_EXE_insonify"))
-        .args(["render", "-o", &rendered, &scene])
-        .stdout(std::process::Stdio::null())
-        .status()
-        .expect("started");
-    assert!(status.success());
     let saved = image::open(path("cyst-and-wires-0001.png")).expect("a picture");
-    let rendered = image::open(rendered).expect("a picture");
-    assert!(saved == rendered, "the pixels differ");
+    assert!(saved == rendered(folder.path(), &still), "the pixels differ");
 
     let text = std::fs::read_to_string(json).expect("written");
     let said: Value = serde_json::from_str(&text).expect("JSON");

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use image::AnimationDecoder;
 use image::codecs::gif::GifDecoder;
+use insonify::gpu::list_devices;
 use serde_json::Value;
 
 use super::desk::{Desk, Key};
@@ -30,6 +31,25 @@ pub fn sidecar(desk: &mut Desk, folder: &Path, name: &str) -> Value {
         found.is_some()
     });
     found.expect("waited for")
+}
+
+/// The picture of the scene that `insonify render` makes in a folder, with the device and the tracer of a still's
+/// sidecar: the window's device is one that can show pictures, `render` alone would take the best.
+pub fn rendered(folder: &Path, still: &Value) -> image::DynamicImage {
+    let (scene, picture) = (folder.join("scene.toml"), folder.join("rendered.png"));
+    std::fs::write(&scene, SCENE).expect("written");
+    let devices = list_devices().expect("devices");
+    let shown = devices.iter().find(|d| still["device"] == format!("{} ({})", d.name, d.driver));
+    let device = shown.expect("the window's device").index.to_string();
+    let tracer = still["tracer"].as_str().expect("a tracer");
+    let status = std::process::Command::new(env!("CARGO_BIN_EXE_insonify"))
+        .args(["render", "--device", &device, "--tracer", tracer, "-o"])
+        .args([&picture, &scene])
+        .stdout(std::process::Stdio::null())
+        .status()
+        .expect("started");
+    assert!(status.success());
+    image::open(picture).expect("a picture")
 }
 
 #[test]
@@ -72,18 +92,7 @@ fn a_frozen_loop_shows_and_saves_what_was_imaged_before() {
     desk.press(Key::F2);
     let still = sidecar(&mut desk, &captures, "cyst-and-wires-0001.json");
     let saved = image::open(captures.join("cyst-and-wires-0001.png")).expect("a picture");
-    let rendered = captures.join("rendered.png");
-    let scene = captures.join("scene.toml");
-    std::fs::write(&scene, SCENE).expect("written");
-    let status = std::process::Command::new(env!("CARGO_BIN_EXE_insonify"))
-        .args(["render", "-o"])
-        .args([&rendered, &scene])
-        .stdout(std::process::Stdio::null())
-        .status()
-        .expect("started");
-    assert!(status.success());
-    let rendered = image::open(rendered).expect("a picture");
-    assert!(saved == rendered, "the pixels differ");
+    assert!(saved == rendered(&captures, &still), "the pixels differ");
     assert_eq!(still["file"], "cyst-and-wires-0001.png");
     assert_eq!(still["quality"]["level"], 0, "at rest it is the scene's own");
     assert_eq!(still["image"]["height"], 400);
