@@ -48,6 +48,12 @@ def ball(vertices=None, triangles=None, **more):
     return insonify.Scene(background="liver", mesh={"ball": mesh}, **{**QUICK, **more})
 
 
+def chosen():
+    """What `insonify.devices()` says of the device that is taken where none is named."""
+    with insonify.Simulator(ball(), tracer="bvh") as simulator:
+        return next(device for device in insonify.devices() if device["name"] == simulator.device)
+
+
 @pytest.fixture
 def scene():
     return ball()
