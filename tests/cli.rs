@@ -1,10 +1,20 @@
 //! The command line as a user sees it: files written, figures reported, mistakes explained.
 
+#[path = "common/skip.rs"]
+mod skip;
+#[path = "common/timestamps.rs"]
+mod timestamps;
+#[path = "common/tracers.rs"]
+mod tracers;
+
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
+use insonify::gpu::test_device;
 use insonify::sim::stages;
 use serde_json::Value;
+use timestamps::timestamps;
+use tracers::tracers;
 
 /// A small frame, so that a software driver takes well under a second.
 const SMALL: [&str; 6] = [
@@ -37,12 +47,14 @@ fn render_writes_picture_stages_and_figures_without_a_validation_message() {
     let dir = tempfile::tempdir().expect("a folder");
     let (png, json, dump) =
         (dir.path().join("a.png"), dir.path().join("a.json"), dir.path().join("stages"));
-    for tracer in ["bvh", "ray-query"] {
+    // The program takes the same device: the best one.
+    let timed = timestamps(&test_device());
+    for tracer in tracers(&test_device()).iter().map(ToString::to_string) {
         let out = render(
             "scenes/phantom.toml",
             &[
                 "--tracer",
-                tracer,
+                &tracer,
                 "-o",
                 path(&png),
                 "--json",
@@ -79,9 +91,12 @@ fn render_writes_picture_stages_and_figures_without_a_validation_message() {
         for key in ["settings", "device", "stages_ms", "frame_ms", "memory", "counters"] {
             assert!(figures[key].is_object(), "{key}");
         }
-        for stage in stages::IMAGE.into_iter().chain(stages::LABELS).map(|pass| pass.name) {
-            assert!(figures["stages_ms"][stage]["p99"].as_f64() > Some(0.0), "{stage}");
+        let stages = stages::IMAGE.into_iter().chain(stages::LABELS).map(|pass| pass.name);
+        for stage in stages.filter(|_| timed) {
+            // A clock may not have ticked within a short one.
+            assert!(figures["stages_ms"][stage]["p99"].as_f64() >= Some(0.0), "{stage}");
         }
+        assert_eq!(figures["frame_ms"]["p99"].as_f64() > Some(0.0), timed);
         let labels = std::fs::metadata(dump.join("kernels/labels.npy")).expect("labels").len();
         assert!(labels > 64 * 48 * 512, "a label for each sample");
         assert!(figures["memory"]["device_peak_bytes"].as_u64() > Some(100_000));

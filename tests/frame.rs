@@ -3,6 +3,8 @@
 
 #[path = "common/shared_data.rs"]
 mod shared_data;
+#[path = "common/tracers.rs"]
+mod tracers;
 
 use std::path::Path;
 use std::sync::Arc;
@@ -13,7 +15,8 @@ use insonify::sim::bvh::Splits;
 use insonify::sim::layout::Frame;
 use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer, tables};
-use shared_data::shared_data;
+use shared_data::{shared_data, skip};
+use tracers::tracers;
 
 /// A scene at a size that a software driver renders in seconds.
 fn small(file: &str) -> Scene {
@@ -69,24 +72,28 @@ fn fainter(device: &Arc<Device>, scene: &Scene, decibels: f64) -> Vec<u8> {
     shoot(device, &scene, Tracer::Bvh).pixels
 }
 
-/// Shots of two runs. Accumulators are integers, so the order of additions leaves no trace: the runs are equal bit
-/// for bit.
-fn repeats(device: &Arc<Device>, scene: &Scene) -> [Shot; 2] {
-    let shots = [Tracer::Bvh, Tracer::RayQuery].map(|tracer| {
+/// A shot of each tracer, made twice. Accumulators are integers, so the order of additions leaves no trace: the runs are
+/// equal bit for bit.
+fn repeats(device: &Arc<Device>, scene: &Scene) -> Vec<Shot> {
+    let shots = tracers(device).into_iter().map(|tracer| {
         let first = shoot(device, scene, tracer);
         assert!(first.echoes.concat().iter().any(|&v| v != 0), "{tracer}: silence");
         assert!(first == shoot(device, scene, tracer), "{tracer} twice");
         first
     });
+    let shots: Vec<Shot> = shots.collect();
     let mut other = scene.clone();
     other.simulation.seed += 1;
     assert!(shots[0] != shoot(device, &other, Tracer::Bvh), "another seed is noticed");
     shots
 }
 
-/// Asserts that both tracers agree. Both compute the hit on the found triangle alike; 99.9 % of the pixels within
+/// Asserts that the tracers agree. Both compute the hit on the found triangle alike; 99.9 % of the pixels within
 /// one grey level allows for the few rays near an edge for which a device's own test finds the neighbour.
-fn agree(device: &Arc<Device>, scene: &Scene, [bvh, query]: &[Shot; 2]) {
+fn agree(device: &Arc<Device>, scene: &Scene, shots: &[Shot]) {
+    let [bvh, query] = shots else {
+        return; // `tracers` has said so.
+    };
     let share = differing(&bvh.pixels, &query.pixels);
     assert!(share <= 0.001, "{:.3} % of the pixels differ", 100.0 * share);
     let planted = differing(&fainter(device, scene, 0.5), &query.pixels);
@@ -203,8 +210,8 @@ fn both_tracers_agree_on_real_anatomy() {
     let device = test_device();
     for name in ["liver", "heart", "heart_rodero"] {
         let scene = small(&format!("tests/scenes/{name}.toml"));
-        let shots = [Tracer::Bvh, Tracer::RayQuery].map(|t| shoot(&device, &scene, t));
-        agree(&device, &scene, &shots);
+        let shots = tracers(&device).into_iter().map(|t| shoot(&device, &scene, t));
+        agree(&device, &scene, &shots.collect::<Vec<_>>());
     }
     assert_eq!(device.validation_messages(), Vec::<String>::new());
 }

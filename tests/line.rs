@@ -1,5 +1,10 @@
 //! A scanline made alone: it is the image's, and many of them are M-mode.
 
+#[path = "common/skip.rs"]
+mod skip;
+#[path = "common/tracers.rs"]
+mod tracers;
+
 use std::f64::consts::TAU;
 use std::path::Path;
 
@@ -7,6 +12,7 @@ use insonify::gpu::test_device;
 use insonify::scene::Scene;
 use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer};
+use tracers::tracers;
 
 /// A shipped scene with few lines.
 fn scene(name: &str, more: &[(&str, &str)]) -> Scene {
@@ -76,7 +82,7 @@ fn compare(scene: &Scene, tracer: Tracer) {
 
 #[test]
 fn a_line_alone_is_that_of_the_image() {
-    for tracer in [Tracer::Bvh, Tracer::RayQuery] {
+    for tracer in tracers(&test_device()) {
         // A curved face on the skin; all lines from one point, random numbers of each line's own; a flat face.
         compare(&scene("abdomen.toml", &[]), tracer);
         let mut heart = scene("heart.toml", &[("simulation.rough_transmission", "true")]);

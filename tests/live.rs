@@ -1,6 +1,6 @@
 //! Live quality: levels are as bright as the scene's own, and going through them leaves no trace.
 
-use insonify::gpu::{Device, DeviceOptions};
+use insonify::gpu::lone_test_device;
 use insonify::live::Ladder;
 use insonify::probe::Probe;
 
@@ -10,10 +10,6 @@ use insonify::sim::{Simulator, Tracer};
 
 /// A difference of brightness that nobody notices, dB.
 const SEEN: f64 = 0.3;
-
-fn device() -> std::sync::Arc<Device> {
-    Device::new(&DeviceOptions::default()).expect("a device")
-}
 
 /// Liver without structure of its own, wide and deep enough for the speckle's mean.
 fn phantom() -> Scene {
@@ -49,7 +45,7 @@ fn level(simulator: &mut Simulator, scene: &Scene) -> f64 {
 
 /// Differences of all levels of the ladder from the scene's own, dB; `plant` spoils the levels.
 fn differences(plant: impl Fn(&mut Scene)) -> Vec<f64> {
-    let device = device();
+    let device = lone_test_device();
     let own = phantom();
     let ladder = Ladder::of(&own);
     let library = Library::embedded();
@@ -82,7 +78,7 @@ fn a_level_that_is_brighter_is_noticed() {
 
 #[test]
 fn levels_take_turns_in_the_same_buffers_and_leave_no_trace() {
-    let device = device();
+    let device = lone_test_device();
     let library = Library::embedded();
     let mut own = phantom();
     own.probe.scanlines = 64;

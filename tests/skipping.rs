@@ -1,6 +1,11 @@
 //! The work that a fused frame saves: around the masks sound goes straight on, and paths that nobody hears are
 //! not traced.
 
+#[path = "common/skip.rs"]
+mod skip;
+#[path = "common/tracers.rs"]
+mod tracers;
+
 use std::sync::Arc;
 
 use insonify::gpu::{Device, test_device};
@@ -8,6 +13,7 @@ use insonify::scene::Scene;
 use insonify::sim::layout::Counters;
 use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer, dump, tables};
+use tracers::tracers;
 
 /// Two balls, the second behind the first, both beside the middle; a plate with the surrounding speed lies in
 /// front of parts of both. No refraction.
@@ -55,7 +61,6 @@ translate = [-1.3, 0.2, 5.7]
 const VOLUME: &str = "NDims = 3\nDimSize = 2 2 2\nElementSpacing = 40 30 40\nOffset = -20 -15 0\n\
     ElementType = MET_UCHAR\nElementDataFile = LOCAL\n";
 const FUSED: &str = "[volume]\nfile = \"volume.mha\"\n[fusion]\nmask = [\"near\", \"far\"]\n";
-const TRACERS: [Tracer; 2] = [Tracer::Bvh, Tracer::RayQuery];
 
 fn load(more: &str, overrides: &[(&str, &str)]) -> Scene {
     let folder = tempfile::tempdir().expect("a folder");
@@ -122,7 +127,7 @@ fn inside_two_masks_in_a_row_the_echoes_are_those_of_the_whole_scene_for_less_wo
     let device = test_device();
     let (whole, fused) = (load("", &[]), load(FUSED, &[]));
     let shifted = load("", &[("mesh.far.translate", "[3.2, -0.4, 29.33]")]);
-    for tracer in TRACERS {
+    for tracer in tracers(&device) {
         let (expected, all) = shoot(&device, &whole, tracer);
         let (echoes, kept) = shoot(&device, &fused, tracer);
         assert_eq!(unequal(&fused, &echoes, &expected), 0, "{tracer}");
@@ -143,7 +148,7 @@ fn a_mask_off_the_image_costs_no_ray() {
     let device = test_device();
     let off = [("mesh.near.translate", "[60, 0, 20]"), ("mesh.far.translate", "[0, 0, 60]")];
     let scene = load(FUSED, &off);
-    for tracer in TRACERS {
+    for tracer in tracers(&device) {
         let ([surface, volume], counters) = shoot(&device, &scene, tracer);
         assert!(surface.iter().chain(&volume).all(|&v| v == 0), "{tracer}");
         let work = [counters.rays, counters.segments, counters.candidates];
@@ -175,7 +180,7 @@ fn a_plate_in_front_of_the_mask_weakens_what_is_heard_and_moves_nothing() {
     let passed = (1.0 - f64::from(reflected * reflected)).powi(2);
     let expected = passed * (-f64::from(bone.absorption - around.absorption) * along).exp();
     assert!((0.05..0.5).contains(&expected), "{expected}");
-    for tracer in TRACERS {
+    for tracer in tracers(&device) {
         let ([_, clear], _) = shoot(&device, &clear, tracer);
         let ([_, shadowed], _) = shoot(&device, &behind, tracer);
         let places = inside(&behind);

@@ -3,12 +3,15 @@
 use std::path::Path;
 
 use glam::{DAffine3, DVec3};
+use insonify::gpu::test_device;
 use insonify::scene::Scene;
 use insonify::settings::Refraction;
+use insonify::sim::Tracer;
 use insonify::sim::layout::{Label, NONE};
 
 use super::scenes::{add_box, add_layer, linear, tissue};
-use super::{TRACERS, at, labels, place};
+use super::tracers::tracers;
+use super::{at, labels, place};
 
 /// How many places two sets have in common, and how many are in either.
 fn overlap(pairs: impl Iterator<Item = (bool, bool)>) -> [usize; 2] {
@@ -47,7 +50,7 @@ fn cysts(scene: &Scene) -> Vec<(u32, [f64; 2], f64)> {
 
 #[test]
 fn labels_of_the_phantom_s_cysts_are_their_circles() {
-    for tracer in TRACERS {
+    for tracer in tracers(&test_device()) {
         // One layer, and scanlines closer than an image needs them: the test is of places, not of their grid.
         let mut scene = phantom(&[
             ("probe.elevation_layers", "1"),
@@ -109,7 +112,7 @@ fn samples_per_mm(scene: &Scene) -> f64 {
 
 #[test]
 fn behind_a_slab_the_loss_is_what_absorption_and_both_faces_take() {
-    for tracer in TRACERS {
+    for tracer in tracers(&test_device()) {
         // 0.5 dB/(cm MHz) in front and behind; a slab of 8 mm and 3 dB/(cm MHz), 1.7 times the impedance.
         let mut scene = linear(8, 8.0, tissue(1.54, 1.6, 0.5));
         add_box(
@@ -146,7 +149,7 @@ fn behind_an_inclined_surface_snell_says_what_is_seen() {
     const ANGLE: f64 = 0.5;
     const SURFACE: f64 = 20.0;
     const SPEEDS: [f64; 2] = [1.45, 1.65];
-    for tracer in TRACERS {
+    for tracer in tracers(&test_device()) {
         for refraction in [Refraction::Ray, Refraction::Beam] {
             let mut scene = linear(1, 1.0, tissue(SPEEDS[0], 1.6, 0.0));
             scene.simulation.refraction = refraction;
@@ -214,7 +217,7 @@ fn nothing_is_seen_behind_total_reflection() {
         * DAffine3::from_rotation_y(1.1)
         * DAffine3::from_translation(DVec3::new(3.1, 5.3, 0.0));
     add_box(&mut scene, [900.0, 900.0, 400.0], tissue(3.5, 6.0, 0.0), tilt);
-    let labels = labels(&mut scene, TRACERS[0]);
+    let labels = labels(&mut scene, Tracer::Bvh);
     let k = (25.0 * samples_per_mm(&scene)) as usize;
     let label = at(&labels, 0, k);
     assert_eq!([label.tissue, label.instance, label.true_tissue], [NONE, NONE, 1]);
@@ -228,7 +231,7 @@ fn nothing_is_seen_behind_total_reflection() {
 
 #[test]
 fn the_picture_is_the_same_with_labels_and_without() {
-    for tracer in TRACERS {
+    for tracer in tracers(&test_device()) {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/abdomen.toml");
         let set = [("probe.scanlines", "24"), ("probe.samples", "512"), ("simulation.paths", "2")];
         let set = set.map(|(key, value)| (key.to_owned(), value.to_owned()));
@@ -256,7 +259,7 @@ fn the_picture_is_the_same_with_labels_and_without() {
 fn a_layer_of_another_tissue_begins_where_it_is() {
     let mut scene = linear(4, 4.0, tissue(1.54, 1.6, 0.0));
     add_layer(&mut scene, 30.0, tissue(1.6, 1.7, 0.0));
-    let labels = labels(&mut scene, TRACERS[0]);
+    let labels = labels(&mut scene, Tracer::Bvh);
     let k = (30.0 * samples_per_mm(&scene)).ceil() as usize;
     assert_eq!([at(&labels, 2, k - 1), at(&labels, 2, k)].map(|l| l.true_tissue), [0, 1]);
     assert_eq!([at(&labels, 2, k - 1), at(&labels, 2, k)].map(|l| l.tissue), [0, 1]);

@@ -8,8 +8,9 @@ use insonify::sim::{Simulator, Tracer};
 
 use super::frame;
 use super::scenes::{add_layer, linear, tissue};
+use super::timestamps::timestamps;
 
-/// The arrays of samples and pixels, the stages that ran, and the picture, of the first frame.
+/// The arrays of samples and pixels, the stages that were timed, and the picture, of the first frame.
 fn made(simulator: &mut Simulator, scene: &Scene) -> ([Vec<LabelArray>; 2], Vec<String>, Vec<u8>) {
     let labels = frame(simulator, scene, 0);
     let timings = simulator.wait().expect("no device error").pop().expect("a frame");
@@ -32,13 +33,16 @@ fn they_are_the_others_and_cost_no_second_trace() {
     add_layer(&mut scene, 10.0, tissue(1.45, 1.38, 0.6));
     let mut simulator = super::simulator(&mut scene, Tracer::Bvh);
     let (all, stages, picture) = made(&mut simulator, &scene);
-    let ran = |stages: &[String]| {
-        ["label", "chart", "expect", "level"].map(|stage| stages.iter().any(|s| s == stage))
+    let timed = timestamps(&test_device());
+    let ran = |stages: &[String], expected: [bool; 4]| {
+        let names = ["label", "chart", "expect", "level"];
+        let found = names.map(|stage| stages.iter().any(|s| s == stage));
+        assert_eq!(found, expected.map(|ran| ran && timed));
     };
-    assert_eq!(ran(&stages), [true; 4]);
+    ran(&stages, [true; 4]);
     scene.simulation.label_levels = false;
     let (few, stages, same) = made(&mut simulator, &scene);
-    assert_eq!(ran(&stages), [true, true, false, false]);
+    ran(&stages, [true, true, false, false]);
     assert!(picture == same, "the picture stays");
     for (all, few) in all.iter().zip(&few) {
         assert_eq!((all.len(), few.len()), (KINDS.len(), KINDS.len() - 2));
@@ -51,7 +55,7 @@ fn they_are_the_others_and_cost_no_second_trace() {
     // A simulator made without them gets room for them when they are asked for.
     let mut second =
         Simulator::new(&test_device(), &Library::embedded(), &scene, Tracer::Bvh).expect("made");
-    assert_eq!(ran(&made(&mut second, &scene).1), [true, true, false, false]);
+    ran(&made(&mut second, &scene).1, [true, true, false, false]);
     scene.simulation.label_levels = true;
     second.fit(&scene).expect("room");
     let (again, _, _) = made(&mut second, &scene);

@@ -11,6 +11,12 @@ mod program;
 #[path = "../physics/scenes.rs"]
 #[allow(dead_code, reason = "the scenes of other tests")]
 mod scenes;
+#[path = "../common/skip.rs"]
+mod skip;
+#[path = "../common/timestamps.rs"]
+mod timestamps;
+#[path = "../common/tracers.rs"]
+mod tracers;
 
 use insonify::gpu::test_device;
 use insonify::scene::Scene;
@@ -19,14 +25,10 @@ use insonify::sim::layout::Label;
 use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer};
 
-const TRACERS: [Tracer; 2] = [Tracer::Bvh, Tracer::RayQuery];
-
 /// A simulator of a scene that asks for labels.
 fn simulator(scene: &mut Scene, tracer: Tracer) -> Simulator {
     scene.simulation.labels = true;
-    let device = test_device();
-    assert!(device.supports_ray_query(), "the tests need a device with ray query");
-    Simulator::new(&device, &Library::embedded(), scene, tracer).expect("a simulator")
+    Simulator::new(&test_device(), &Library::embedded(), scene, tracer).expect("a simulator")
 }
 
 /// The labels of a frame.

@@ -1,11 +1,13 @@
 //! How tissue has moved since the last frame.
 
 use glam::{DAffine3, DMat3, DQuat, DVec3};
+use insonify::gpu::test_device;
 use insonify::scene::{Keyframes, Mesh, Scene, Strategy, shapes};
 use insonify::sim::layout::Label;
 
 use super::scenes::{add_body, linear, tissue};
-use super::{TRACERS, frame, place, simulator};
+use super::tracers::tracers;
+use super::{frame, place, simulator};
 
 /// How a label says that its tissue has moved, mm.
 fn moved(label: &Label) -> DVec3 {
@@ -31,7 +33,7 @@ fn scene() -> Scene {
 
 #[test]
 fn a_body_that_moves_takes_its_tissue_along_and_the_rest_stays() {
-    for tracer in TRACERS {
+    for tracer in tracers(&test_device()) {
         let mut scene = scene();
         let mut simulator = simulator(&mut scene, tracer);
         let none = u32::MAX;
@@ -77,7 +79,7 @@ fn a_body_that_moves_takes_its_tissue_along_and_the_rest_stays() {
 
 #[test]
 fn a_shape_that_a_program_sets_moves_its_tissue_from_the_first_time_on() {
-    for tracer in TRACERS {
+    for tracer in tracers(&test_device()) {
         let mut scene = scene();
         let mut simulator = simulator(&mut scene, tracer);
         frame(&mut simulator, &scene, 0);
@@ -125,7 +127,7 @@ fn a_body_that_is_squeezed_moves_as_its_keyframes_say() {
         DVec3::new(0.0, 0.0, 0.85),
     );
     let middle = DVec3::new(0.3, 0.1, 30.0);
-    for tracer in TRACERS {
+    for tracer in tracers(&test_device()) {
         let mut scene = deforming(map, Strategy::Interpolate);
         let mut simulator = simulator(&mut scene, tracer);
         frame(&mut simulator, &scene, 0);

@@ -1,18 +1,19 @@
 //! The colours of the tissues over the image.
 
 use insonify::gpu::{Image, ImageDim, ImageFormat, test_device};
+use insonify::sim::Tracer;
 use insonify::sim::labels::colours;
 use insonify::sim::layout::NONE;
 
 use super::scenes::{add_layer, linear, tissue};
-use super::{TRACERS, frame, simulator};
+use super::{frame, simulator};
 
 #[test]
 fn colours_lie_over_the_pixels_of_their_tissues_and_leave_the_image_alone() {
     let mut scene = linear(16, 20.0, tissue(1.54, 1.6, 0.5));
     add_layer(&mut scene, 30.0, tissue(1.6, 1.7, 0.5));
     scene.imaging.image_height = 120;
-    let mut simulator = simulator(&mut scene, TRACERS[0]);
+    let mut simulator = simulator(&mut scene, Tracer::Bvh);
     let labels = frame(&mut simulator, &scene, 0);
     let plain = simulator.pixels().expect("pixels");
     assert_eq!(simulator.painted_pixels().expect("no device error"), None, "nobody asked");

@@ -1,18 +1,21 @@
 //! How loud echoes are expected to be, and which part of them came by detours.
 
 use glam::{DAffine3, DVec3};
+use insonify::gpu::test_device;
 use insonify::scene::Scene;
+use insonify::sim::Tracer;
 use insonify::sim::labels::Labels;
 use insonify::sim::layout::LEAST_POWER;
 
 use super::scenes::{add_box, add_layer, linear, silent, tissue};
-use super::{TRACERS, at, frame, labels, simulator};
+use super::tracers::tracers;
+use super::{at, frame, labels, simulator};
 
 /// Frames over which power is averaged.
 const SEEDS: u32 = 24;
 
 /// Mean power of each sample of IQ over the seeds, and the labels of the last frame.
-fn mean_power(scene: &mut Scene, tracer: insonify::sim::Tracer) -> (Vec<f64>, Labels) {
+fn mean_power(scene: &mut Scene, tracer: Tracer) -> (Vec<f64>, Labels) {
     let mut simulator = simulator(scene, tracer);
     let mut sum = Vec::new();
     let mut last = None;
@@ -47,7 +50,7 @@ fn layered() -> Scene {
 
 #[test]
 fn the_mean_power_of_many_frames_is_the_expected_level() {
-    for tracer in TRACERS {
+    for tracer in tracers(&test_device()) {
         let mut scene = layered();
         let (powers, labels) = mean_power(&mut scene, tracer);
         let [lines, samples] = labels.samples.shape;
@@ -83,10 +86,10 @@ fn the_mean_power_of_many_frames_is_the_expected_level() {
 fn without_surfaces_nothing_is_reflected_and_without_echoes_there_is_no_level() {
     let mut scene = linear(4, 4.0, tissue(1.54, 1.6, 0.5));
     scene.simulation.max_reflections = 3;
-    let speckle = labels(&mut scene, TRACERS[0]);
+    let speckle = labels(&mut scene, Tracer::Bvh);
     assert!(speckle.samples.labels.iter().all(|l| l.reverberation == 0.0 && l.level > -200.0));
     let mut scene = linear(4, 4.0, silent(1.54, 1.6, 0.5));
-    let silent = labels(&mut scene, TRACERS[0]);
+    let silent = labels(&mut scene, Tracer::Bvh);
     let least = 10.0 * LEAST_POWER.log10();
     assert!(silent.samples.labels.iter().all(|l| (l.level - least).abs() < 1e-3));
 }
@@ -111,7 +114,7 @@ fn echoes_between_two_faces_are_reverberation_as_their_series_says() {
         scene
     };
     let series = |m: i32| (1.0 - FACES[0].powi(2)) * FACES[1] * (-FACES[0] * FACES[1]).powi(m);
-    for tracer in TRACERS {
+    for tracer in tracers(&test_device()) {
         let mut scene = build(false);
         let dark = labels(&mut scene, tracer);
         let per_mm = scene.probe.sample_pitch().recip();
