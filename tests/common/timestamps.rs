@@ -1,4 +1,4 @@
-//! Whether a device tells how long its stages take.
+//! Timestamps of a device, without which it does not tell how long its stages take.
 
 use insonify::gpu::Device;
 

@@ -158,12 +158,11 @@ pub fn by_aim(rays: &[usize]) -> [usize; 2] {
 }
 
 /// Most of the rays aimed exactly at vertices and edges that may slip through. Ours: none. Vulkan wishes that a device's
-/// own triangle test lose none there and does not demand it (Mesa 25's software driver loses 2 in 100 at a box). A
-/// quarter is less than a test that decides by chance would lose. What we make of a device's answers shows in all other
-/// rays, of which none may be wrong.
+/// own triangle test lose none there and does not demand it: Mesa 25's software driver loses 2 in 100 at a box, and twice
+/// that is allowed. What we make of a device's answers shows in all other rays, of which none may be wrong.
 pub fn slips(tracer: Tracer, aimed: usize) -> usize {
     match tracer {
         Tracer::Bvh => 0,
-        Tracer::RayQuery => aimed / 4,
+        Tracer::RayQuery => aimed * 400 / 10_000,
     }
 }
