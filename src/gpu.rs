@@ -55,7 +55,10 @@ pub use barrier::Stage;
 pub use blas::{Blas, BlasInput, BlasOptions};
 pub use build_times::{BuildTimes, RefitTimes, build_times, refit_times};
 pub use commands::{Binding, Commands};
-pub use device::{Device, DeviceOptions, Limits, lone_test_device, test_device};
+pub use device::{
+    Device, DeviceOptions, Limits, LoneDevice, TestDevice, lone_device, lone_test_device,
+    test_device,
+};
 pub use dynamic::{DynamicBlas, DynamicSource};
 pub use error::GpuError;
 pub use frames::{Abandon, FRAMES_IN_FLIGHT, Frames};

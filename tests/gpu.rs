@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use insonify::gpu::{
     AddressMode, Binding, Buffer, BufferKind, Device, DeviceOptions, Filter, GpuError, Image,
-    ImageDim, ImageFormat, Kernel, Sampler, list_devices, lone_test_device,
+    ImageDim, ImageFormat, Kernel, LoneDevice, Sampler, list_devices, lone_device,
+    lone_test_device,
 };
 
 #[path = "gpu/accel.rs"]
@@ -24,7 +25,7 @@ mod timestamps;
 const ADD_GROUP: u32 = 32;
 
 /// Drops the device and fails if the layers have given a message by then, leaks included.
-fn assert_clean(device: Arc<Device>) {
+fn assert_clean(device: LoneDevice) {
     assert_eq!(Arc::strong_count(&device), 1, "drop what was made of the device first");
     let log = device.validation_log();
     drop(device);
@@ -67,7 +68,7 @@ fn devices_are_listed_with_what_they_lack() {
 fn an_unknown_device_is_answered_with_the_list() {
     for selector in ["no such adapter", "99"] {
         let options = DeviceOptions { selector: Some(selector.into()), ..Default::default() };
-        let error = Device::new(&options).err().expect("no device is called so");
+        let error = lone_device(&options).err().expect("no device is called so");
         let text = error.to_string();
         assert!(matches!(error, GpuError::UnknownDevice { .. }));
         assert!(text.contains(selector), "{text}");
@@ -83,7 +84,7 @@ fn a_device_is_chosen_by_index_or_part_of_its_name() {
     let part = first.name[1..].to_uppercase();
     for selector in ["0".to_owned(), part] {
         let options = DeviceOptions { selector: Some(selector), ..Default::default() };
-        assert_eq!(Device::new(&options).unwrap().name(), first.name);
+        assert_eq!(lone_device(&options).unwrap().name(), first.name);
     }
 }
 

@@ -57,6 +57,8 @@ reported() {
   "$@" 2>&1 | tee "$file"
   return "${PIPESTATUS[0]}"
 }
+# A program that dies leaves its memory behind where the system writes that into the folder.
+[ "$(cat /proc/sys/kernel/core_pattern 2>/dev/null)" != core ] || [ -e core ] || ulimit -c unlimited || true
 code=0
 begun=$SECONDS
 reported build cargo test --features "$features" --no-run "${arguments[@]}" || code=1
@@ -68,6 +70,14 @@ if [ -z "$chosen" ] && ! FEATURES=$features reported python ./tools/python.sh; t
   grep -q "tests of the Python package" "$INSONIFY_LACKS" || code=1
 fi
 python=$((SECONDS - begun))
+
+# The threads of the last program that died.
+died=$(sed -nE "s/^  process didn't exit successfully: \`([^ \`]+).*\(.*SIG.*/\1/p" "$report"/tests 2>/dev/null | tail -1)
+if [ "$(ulimit -c)" = unlimited ] && [ -e core ]; then
+  [ -z "$died" ] || ! command -v gdb >/dev/null ||
+    gdb -nx -batch -ex "thread apply all backtrace 24" "$died" core 2>/dev/null | tail -n 600 | tee "$report"/threads
+  rm -f core
+fi
 
 echo
 echo "==== summary ===="

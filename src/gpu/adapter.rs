@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use ash::{khr, vk};
 
 use super::error::{GpuError, during};
-use super::instance::{Instance, LOADER_LISTS};
+use super::instance::{Instance, loader_changes, loader_reads};
 use super::queues::QueuePlan;
 
 /// Kinds of device, in the order of preference.
@@ -174,7 +174,7 @@ fn rank(kind: AdapterKind, driver: vk::DriverId) -> (bool, AdapterKind) {
 }
 
 fn adapters(instance: &Instance) -> Result<Vec<Adapter>, GpuError> {
-    let changing = LOADER_LISTS.write();
+    let changing = loader_changes();
     // SAFETY: the instance is alive.
     let physical = unsafe { instance.raw.enumerate_physical_devices() }
         .map_err(during("listing the Vulkan devices"))?;
@@ -292,6 +292,7 @@ fn device_extensions(
     instance: &Instance,
     physical: vk::PhysicalDevice,
 ) -> Result<Vec<CString>, GpuError> {
+    let _reading = loader_reads();
     // SAFETY: `physical` belongs to this instance.
     let extensions = unsafe { instance.raw.enumerate_device_extension_properties(physical) }
         .map_err(during("listing the device extensions"))?;

@@ -188,7 +188,10 @@ impl Job {
     /// Does it in this process.
     fn run(&self) -> Result<(), GpuError> {
         let open = |name: &String| {
-            Device::new(&DeviceOptions { selector: Some(name.clone()), ..Default::default() })
+            Device::for_compiling(&DeviceOptions {
+                selector: Some(name.clone()),
+                ..Default::default()
+            })
         };
         match self {
             Self::Kernel(job) => {

@@ -1,10 +1,11 @@
 //! The logical device: features, queue, allocator, object names.
 
 mod create;
+mod testing;
 
 use std::ffi::CString;
 use std::path::PathBuf;
-use std::sync::{Arc, LazyLock, OnceLock};
+use std::sync::{Arc, OnceLock};
 
 use ash::{ext, khr, vk};
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
@@ -13,11 +14,13 @@ use parking_lot::Mutex;
 use super::adapter::{self, AdapterKind, DeviceInfo};
 use super::ahead;
 use super::error::GpuError;
-use super::instance::{Instance, LOADER_LISTS, ValidationLog};
+use super::instance::{Instance, ValidationLog, loader_changes, loader_reads};
 use super::kept::{self, PipelineStore};
 use super::memory::{MemoryUse, MemoryUseCounter};
 use super::pipelines::Pipelines;
 use super::queues::Queues;
+
+pub use testing::{LoneDevice, TestDevice, lone_device, lone_test_device, test_device};
 
 /// Size of the blocks that the allocator takes from the driver. Its default of 256 MiB would make the memory
 /// of a small scene look like that of a large one; larger buffers get a block of their own anyway.
@@ -114,18 +117,25 @@ impl Device {
     /// # Errors
     /// No such device, or no usable one; missing parts for validation.
     pub fn new(options: &DeviceOptions) -> Result<Arc<Self>, GpuError> {
-        Self::open(options, None)
+        Self::open(options, asked_to_validate(options), None)
+    }
+
+    /// Opens the chosen device to compile kernels on it, never with validation: each kernel is made once more on the
+    /// device that needs it, and there it is validated. The layers of 1.3.239 keep all instances and devices of a process
+    /// in one table, which they change without a lock; whatever another thread calls meanwhile reads it.
+    pub(super) fn for_compiling(options: &DeviceOptions) -> Result<Arc<Self>, GpuError> {
+        Self::open(options, false, None)
     }
 
     /// Opens the chosen device; with a `window`, the best one that can show pictures in it.
     pub(super) fn open(
         options: &DeviceOptions,
+        validate: bool,
         window: Option<Showing<'_>>,
     ) -> Result<Arc<Self>, GpuError> {
-        let from_environment = std::env::var_os("INSONIFY_VALIDATE").is_some_and(|v| v == "1");
         // Before the driver makes its folders.
         let jit_forgotten = kept::llvmpipe_has_nothing();
-        let instance = Instance::new(options.validate || from_environment, window.is_some())?;
+        let instance = Instance::new(validate, window.is_some())?;
         let presents = window.map(|showing| showing(&instance)).transpose();
         let presents = presents.map_err(|reason| GpuError::Window {
             device: options.selector.clone().unwrap_or_else(|| "any device".into()),
@@ -163,7 +173,7 @@ impl Device {
             (Ok(allocator), Ok(kept)) => (allocator, kept),
             (allocator, kept) => {
                 drop(allocator);
-                let _changing = LOADER_LISTS.write();
+                let _changing = loader_changes();
                 // SAFETY: nothing made from the device is left but a cache, which goes first.
                 unsafe {
                     if let Ok(kept) = kept {
@@ -177,12 +187,17 @@ impl Device {
                 });
             }
         };
+        let accel = create::accel_support(&instance, &raw, &adapter);
+        let reading = loader_reads();
+        let debug =
+            (instance.debug_utils).then(|| ext::debug_utils::Device::new(&instance.raw, &raw));
+        drop(reading);
         let limits = &adapter.properties.limits;
         let bits = |family: u32| adapter.families[family as usize].timestamp_valid_bits;
         Ok(Arc::new(Self {
             timestamp_period_ns: f64::from(limits.timestamp_period),
             timestamp_bits: bits(plan.work.family).min(bits(plan.window.family)),
-            accel: create::accel_support(&instance, &raw, &adapter),
+            accel,
             physical: adapter.physical,
             memory_use: MemoryUseCounter::default(),
             kept,
@@ -202,8 +217,7 @@ impl Device {
                 max_group_threads: limits.max_compute_work_group_invocations,
                 max_shared_bytes: limits.max_compute_shared_memory_size,
             },
-            debug: (instance.debug_utils)
-                .then(|| ext::debug_utils::Device::new(&instance.raw, &raw)),
+            debug,
             queues,
             allocator: Mutex::new(Some(allocator)),
             info: adapter.info,
@@ -330,7 +344,7 @@ impl Device {
         let text = CString::new(name.split('\0').next().unwrap_or_default()).unwrap_or_default();
         let info =
             vk::DebugUtilsObjectNameInfoEXT::default().object_handle(handle).object_name(&text);
-        let _listed = LOADER_LISTS.read();
+        let _listed = loader_reads();
         // SAFETY: the handle was made from this device by the caller and is alive.
         let _ = unsafe { debug.set_debug_utils_object_name(&info) };
     }
@@ -362,7 +376,7 @@ impl Drop for Device {
             // Before the lock: one that is being made on a device of its own needs it to end.
             self.pipelines.destroy();
         }
-        let _changing = LOADER_LISTS.write();
+        let _changing = loader_changes();
         drop(allocator);
         // SAFETY: as above.
         unsafe {
@@ -372,22 +386,7 @@ impl Drop for Device {
     }
 }
 
-/// The device of all tests in this process: the best one, with validation. Pipelines are made once for all of them, and
-/// a message of validation fails every test that looks. Panics with the remedy where the driver or the layer is missing,
-/// because a test that skips validation in silence proves nothing.
-pub fn test_device() -> Arc<Device> {
-    static DEVICE: LazyLock<Arc<Device>> = LazyLock::new(lone_test_device);
-    DEVICE.clone()
-}
-
-/// Like [`test_device`], but nobody else's: for tests that count what is on it, or that it is dropped.
-pub fn lone_test_device() -> Arc<Device> {
-    let options = DeviceOptions { validate: true, ..Default::default() };
-    match Device::new(&options) {
-        Ok(device) => device,
-        Err(error) => panic!(
-            "the tests need a Vulkan device and the validation layers: {error}\n\
-             ./tools/test.sh installs both"
-        ),
-    }
+/// Returns whether the options or the environment ask for validation.
+pub(super) fn asked_to_validate(options: &DeviceOptions) -> bool {
+    options.validate || std::env::var_os("INSONIFY_VALIDATE").is_some_and(|v| v == "1")
 }

@@ -1,7 +1,7 @@
 //! The Vulkan instance: loader, validation layers and the log of their messages.
 
 use std::ffi::{CStr, c_char, c_void};
-use std::sync::{Arc, RwLock};
+use std::sync::{Arc, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
 
 use ash::{ext, khr, vk};
 use parking_lot::Mutex;
@@ -48,9 +48,20 @@ impl ValidationLog {
     }
 }
 
-/// Lock for the loader's lists. The loader (1.4.309) reads its lists of instances, drivers and devices without a
-/// lock when an object is named through a layer: a change of the lists locks for writing, naming for reading.
-pub(super) static LOADER_LISTS: RwLock<()> = RwLock::new(());
+/// Lock for the loader's lists of instances, drivers and devices. The loader (1.3.239, 1.4.309) walks all of them, and
+/// what their entries point to, wherever it looks up a function, names an object or makes a swapchain; its own locks
+/// do not keep another thread from destroying a device meanwhile.
+static LOADER_LISTS: RwLock<()> = RwLock::new(());
+
+/// Keeps the loader's lists as they are: for every call that makes the loader read them.
+pub(super) fn loader_reads() -> RwLockReadGuard<'static, ()> {
+    LOADER_LISTS.read().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Keeps others from the loader's lists: for every call that makes the loader change them.
+pub(super) fn loader_changes() -> RwLockWriteGuard<'static, ()> {
+    LOADER_LISTS.write().unwrap_or_else(PoisonError::into_inner)
+}
 
 struct Messenger {
     functions: ext::debug_utils::Instance,
@@ -159,7 +170,7 @@ impl Instance {
         } else if validate {
             info = info.push_next(&mut features);
         }
-        let changing = LOADER_LISTS.write();
+        let changing = loader_changes();
         // SAFETY: all pointers in `info` outlive the call; layers and extensions are offered.
         let raw = unsafe { entry.create_instance(&info, None) }
             .map_err(during("creating the Vulkan instance"))?;
@@ -180,6 +191,7 @@ impl Instance {
     }
 
     fn listen(&self) -> Result<Messenger, GpuError> {
+        let _reading = loader_reads();
         let functions = ext::debug_utils::Instance::new(&self.entry, &self.raw);
         let info = vk::DebugUtilsMessengerCreateInfoEXT::default()
             .message_severity(
@@ -199,7 +211,7 @@ impl Instance {
 
 impl Drop for Instance {
     fn drop(&mut self) {
-        let _changing = LOADER_LISTS.write();
+        let _changing = loader_changes();
         // SAFETY: every device of this instance has been destroyed by its owner before.
         unsafe {
             if let Some(messenger) = self.messenger.take() {

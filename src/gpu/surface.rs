@@ -6,17 +6,21 @@ use ash::{khr, vk};
 use winit::raw_window_handle::{HasDisplayHandle, HasWindowHandle};
 use winit::window::Window;
 
-use super::device::{Device, DeviceOptions};
+use super::device::{Device, DeviceOptions, asked_to_validate};
 use super::error::{GpuError, during};
-use super::instance::Instance;
+use super::instance::{Instance, loader_reads};
 use super::queues::QueueUser;
 
-/// The surface of `window` for `instance`; the caller destroys it, before the window.
-fn surface_of(instance: &Instance, window: &Window) -> Result<vk::SurfaceKHR, String> {
+/// The surface of `window` for `instance`, and the functions that take one; the caller destroys it, before the window.
+fn surface_of(
+    instance: &Instance,
+    window: &Window,
+) -> Result<(vk::SurfaceKHR, khr::surface::Instance), String> {
     let display = window.display_handle().map_err(|e| e.to_string())?;
     let handle = window.window_handle().map_err(|e| e.to_string())?;
+    let _reading = loader_reads();
     // SAFETY: the handles belong to the window, which outlives the surface.
-    unsafe {
+    let surface = unsafe {
         ash_window::create_surface(
             &instance.entry,
             &instance.raw,
@@ -25,7 +29,8 @@ fn surface_of(instance: &Instance, window: &Window) -> Result<vk::SurfaceKHR, St
             None,
         )
     }
-    .map_err(|code| format!("the window has no Vulkan surface ({code:?})"))
+    .map_err(|code| format!("the window has no Vulkan surface ({code:?})"))?;
+    Ok((surface, khr::surface::Instance::new(&instance.entry, &instance.raw)))
 }
 
 /// Finds devices and queue families that can show pictures in a window; used before a device is opened.
@@ -41,11 +46,8 @@ impl<'a> PresentProbe<'a> {
     /// # Errors
     /// The window system's message.
     pub(crate) fn new(instance: &Instance, window: &'a Window) -> Result<Self, String> {
-        Ok(Self {
-            handle: surface_of(instance, window)?,
-            functions: khr::surface::Instance::new(&instance.entry, &instance.raw),
-            _window: window,
-        })
+        let (handle, functions) = surface_of(instance, window)?;
+        Ok(Self { handle, functions, _window: window })
     }
 
     /// Returns whether `family` of a device of the probe's instance can; false for a device that does not answer.
@@ -60,6 +62,7 @@ impl<'a> PresentProbe<'a> {
 
 impl Drop for PresentProbe<'_> {
     fn drop(&mut self) {
+        let _reading = loader_reads();
         // SAFETY: nothing was made of the surface.
         unsafe { self.functions.destroy_surface(self.handle, None) };
     }
@@ -74,6 +77,7 @@ impl Device {
     pub fn for_window(options: &DeviceOptions, window: &Window) -> Result<Arc<Self>, GpuError> {
         Self::open(
             options,
+            asked_to_validate(options),
             Some(&|instance| {
                 let probe = PresentProbe::new(instance, window)?;
                 Ok(Box::new(move |physical, family| probe.presents(physical, family)))
@@ -97,10 +101,10 @@ impl Surface {
     pub(crate) fn new(device: &Arc<Device>, window: Arc<Window>) -> Result<Self, GpuError> {
         let refused = |reason: String| GpuError::Window { device: device.name().into(), reason };
         let instance = &device.instance;
-        let surface = surface_of(instance, &window).map_err(refused)?;
+        let (surface, functions) = surface_of(instance, &window).map_err(refused)?;
         let mut made = Self {
             handle: surface,
-            functions: khr::surface::Instance::new(&instance.entry, &instance.raw),
+            functions,
             format: vk::SurfaceFormatKHR::default(),
             device: device.clone(),
             _window: window,
@@ -167,6 +171,7 @@ impl Surface {
 
 impl Drop for Surface {
     fn drop(&mut self) {
+        let _reading = loader_reads();
         // SAFETY: swapchains of the surface are dropped before it.
         unsafe { self.functions.destroy_surface(self.handle, None) };
     }

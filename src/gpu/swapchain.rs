@@ -7,6 +7,7 @@ use ash::{khr, vk};
 use super::device::Device;
 use super::error::{GpuError, during};
 use super::image::whole;
+use super::instance::loader_reads;
 use super::queues::QueueUser;
 use super::surface::Surface;
 
@@ -98,10 +99,12 @@ impl Swapchain {
             .present_mode(surface.present_mode()?)
             .clipped(true)
             .old_swapchain(old.map_or(vk::SwapchainKHR::null(), |old| old.handle));
+        let reading = loader_reads();
         let functions = khr::swapchain::Device::new(&device.instance.raw, &device.raw);
         // SAFETY: sizes and usages are those that the surface takes.
         let handle = unsafe { functions.create_swapchain(&info, None) }
             .map_err(during("making the window's pictures"))?;
+        drop(reading);
         let mut made = Self {
             extent,
             pictures: Vec::new(),

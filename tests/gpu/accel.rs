@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use insonify::gpu::{
     Binding, Blas, BlasInput, BlasOptions, Buffer, BufferKind, Device, DeviceOptions, GpuError,
-    Kernel, Stage, Tlas, TlasInstance, build_times, lone_test_device, refit_times,
+    Kernel, LoneDevice, Stage, Tlas, TlasInstance, build_times, lone_device, lone_test_device,
+    refit_times,
 };
 
 use super::skip::{Lacking, skip};
@@ -23,7 +24,7 @@ fn shifted(z: f32) -> [[f32; 4]; 3] {
 }
 
 /// A device with ray queries, or `None` with a message that the test is not run.
-pub fn ray_query_device() -> Option<Arc<Device>> {
+pub fn ray_query_device() -> Option<LoneDevice> {
     let device = lone_test_device();
     if !device.supports_ray_query() {
         skip(Lacking::Tool, &format!("'{}' has no ray queries", device.name()));
@@ -239,7 +240,7 @@ fn a_device_without_acceleration_structures_runs_kernels_and_refuses_rays() {
         without_acceleration_structures: true,
         ..Default::default()
     };
-    let device = Device::new(&options).unwrap();
+    let device = lone_device(&options).unwrap();
     assert!(!device.supports_ray_query() && !device.supports_acceleration_structure());
     let positions = triangle(1.0);
     let input = BlasInput { name: "t", positions: &positions, triangles: &ONE };
@@ -273,7 +274,7 @@ fn structures_are_built_and_timed_without_ray_queries() {
         return;
     }
     let options = DeviceOptions { validate: true, without_ray_query: true, ..Default::default() };
-    let device = Device::new(&options).unwrap();
+    let device = lone_device(&options).unwrap();
     assert!(!device.supports_ray_query() && device.supports_acceleration_structure());
     let spirv = words(include_bytes!("nearest.spv"));
     let error = Kernel::new(&device, "nearest", &spirv, &[]).err().unwrap();

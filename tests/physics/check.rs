@@ -131,7 +131,7 @@ pub struct Bench {
 impl Bench {
     #[cfg(test)]
     pub fn new() -> Self {
-        Self::on(gpu::test_device())
+        Self::on(gpu::test_device().clone())
     }
 
     pub fn on(device: Arc<gpu::Device>) -> Self {

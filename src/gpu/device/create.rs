@@ -5,7 +5,7 @@ use ash::{khr, vk};
 use super::AccelSupport;
 use crate::gpu::adapter::Adapter;
 use crate::gpu::error::{GpuError, during};
-use crate::gpu::instance::{Instance, LOADER_LISTS};
+use crate::gpu::instance::{Instance, loader_changes, loader_reads};
 use crate::gpu::queues::{QueueIndex, QueuePlan};
 
 /// Opens the logical device with the queues of `plan`, and whatever this program can use of what the adapter offers.
@@ -67,7 +67,7 @@ pub(super) fn device(
         info = info.push_next(&mut pipeline);
     }
     let info = info.enabled_extension_names(&extensions);
-    let _changing = LOADER_LISTS.write();
+    let _changing = loader_changes();
     // SAFETY: extensions and features were found on this device; all pointers outlive the call.
     unsafe { instance.raw.create_device(adapter.physical, &info, None) }
         .map_err(during(format!("opening the device '{}'", adapter.info.name)))
@@ -88,6 +88,7 @@ pub(super) fn accel_support(
     unsafe {
         instance.raw.get_physical_device_properties2(adapter.physical, &mut properties);
     }
+    let _reading = loader_reads();
     Some(AccelSupport {
         functions: khr::acceleration_structure::Device::new(&instance.raw, raw),
         scratch_alignment: accel.min_acceleration_structure_scratch_offset_alignment.max(1).into(),
