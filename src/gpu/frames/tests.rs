@@ -1,7 +1,7 @@
 use ash::vk;
 
 use super::{QueueUser, SubmissionSlot};
-use crate::gpu::{Commands, GpuError, lone_test_device};
+use crate::gpu::{Commands, GpuError, lone_test_device, test_device};
 use crate::skip::{Lacking, skip};
 
 #[test]
@@ -50,4 +50,21 @@ fn a_lost_device_names_the_last_pass_that_began() {
     let kept = vk::Result::ERROR_OUT_OF_HOST_MEMORY;
     assert!(matches!(other, GpuError::Vulkan { code, .. } if code == kept));
     assert!(device.validation_messages().is_empty());
+}
+
+/// The layers of Debian 12 die here within seconds where regions are labelled while they validate.
+#[test]
+fn slots_are_made_and_dropped_beside_each_other() {
+    let device = test_device();
+    std::thread::scope(|threads| {
+        for _ in 0..4 {
+            threads.spawn(|| {
+                for _ in 0..400 {
+                    let mut slot = SubmissionSlot::new(&device, "test", QueueUser::Work).unwrap();
+                    let mut commands = Commands::begin(&mut slot, 0).unwrap();
+                    commands.scope("trace");
+                }
+            });
+        }
+    });
 }
