@@ -9,7 +9,8 @@
 #endif
 #include "shared.glsl"
 
-layout(local_size_x = 64) in;
+// Few lines, each on a way of its own: eight to a group, so that they wait for few others, and more of a GPU has work.
+layout(local_size_x = 8) in;
 
 layout(std430, binding = 0) restrict readonly buffer FrameBuffer { Frame frame; };
 layout(std430, binding = 1) restrict readonly buffer InstanceBuffer { Instance instances[]; };

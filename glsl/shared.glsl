@@ -30,8 +30,8 @@ const uint SAMPLING_SHARED_PRIMARY = 2u;
 const uint ROLE_WHOLE = 0u;         // paths echo, and at every surface choose one direction
 const uint ROLE_MAIN = 1u;          // paths are transmitted at every surface and record the interaction
 const uint ROLE_BRANCHES = 2u;      // paths echo at the recorded interactions and follow what is reflected there
+const uint TRACE_GROUP = 64u;        // threads of a work group of paths
 const float LEAST_SURVIVAL = 0.03125; // smallest probability with which a faint branch is followed
-const uint ECHO_BLOCK = 8u;         // paths that one thread takes one after the other at an interaction
 
 const uint FLAG_ROUGH_TRANSMISSION = 1u;
 const uint FLAG_FACE_REFLECTION = 2u;

@@ -14,8 +14,8 @@
 #include "random.glsl"
 
 // Each worker takes one piece of work after the other: a path of a line; in the second
-// dispatch an interaction and an ECHO_BLOCK of paths. So all threads of a group stay busy.
-layout(local_size_x = 64) in;
+// dispatch an interaction and a block of paths. So all threads of a group stay busy.
+layout(local_size_x = TRACE_GROUP) in;
 
 layout(std430, binding = 0) restrict readonly buffer FrameBuffer { Frame frame; };
 layout(std430, binding = 1) restrict readonly buffer TissueBuffer { Tissue tissues[]; };
@@ -50,6 +50,8 @@ layout(push_constant) uniform Push {
     uint pieces;      // number of pieces of work; the line varies fastest
     uint most;        // most pieces that one worker takes
     uint turn;        // which of two counters deals them out; the other one is for the next dispatch
+    uint block;       // paths that a worker takes one after the other at an interaction
+    uint lanes;       // threads of a work group that are workers: fewer wait for the longest path of fewer
 };
 
 // True if everything but masks is transparent to rays.
@@ -102,16 +104,16 @@ bool take(uint piece, out uint line, out uint next, out uint last, out uint main
         return true;
     }
     uint slots = path_count * frame.max_interactions;
-    uint block = at / slots;
-    at -= block * slots;
+    uint blocks_before = at / slots;
+    at -= blocks_before * slots;
     main_path = row * path_count + at / frame.max_interactions;
     slot = row * slots + at;
     if (at % frame.max_interactions >= interaction_count[main_path]) return false;
     next = interactions[slot].path;
     last = next + 1u;
     if (paths_are_alike()) {
-        next = ECHO_BLOCK * block;
-        last = min(next + ECHO_BLOCK, frame.paths);
+        next = block * blocks_before;
+        last = min(next + block, frame.paths);
     }
     return true;
 }
@@ -205,6 +207,7 @@ void main() {
     if (gl_GlobalInvocationID.x == 0u) {
         if (turn == 0u) counters.taken_odd = 0u; else counters.taken_even = 0u;
     }
+    if (gl_LocalInvocationID.x >= lanes) return;
     float time_end = frame.depth / frame.speed;
     uint limit = 64u + frame.max_interactions;
     uint rays = 0u, met = 0u, written = 0u;

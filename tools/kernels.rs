@@ -205,8 +205,7 @@ fn compile(device: &Arc<Device>, library: &Library) -> bool {
             false => &[ROLE_WHOLE],
         };
         for &role in roles {
-            let constants = Round::constants(role);
-            let constants = if roles.len() > 1 { &constants[..] } else { &[] };
+            let constants = if roles.len() > 1 { Round::constants(role) } else { &[] };
             if stem.ends_with("_query") && !device.supports_ray_query() {
                 output::line(format_args!("{stem}: not compiled, the device has no ray query"));
                 continue;

@@ -36,7 +36,7 @@ impl Passes {
         for begin in (0..direct.paths).step_by(self.batches.paths as usize) {
             let paths = begin..direct.paths.min(begin + self.batches.paths);
             for round in self.batches.rounds.of(&direct, paths, &mut turn) {
-                let threads = Extent::Threads([round.workers, 1, 1]);
+                let threads = Extent::Threads(round.threads());
                 let push = bytemuck::cast_slice(&round.push);
                 let pass = &TRACE[round.role as usize];
                 self.record(cmd, pass, threads, push, &|lane| named(lane, &instead))?;

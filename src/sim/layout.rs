@@ -97,10 +97,10 @@ constants! {
     pub const ROLE_MAIN: u32 = 1;
     /// Role: echoes at the recorded interactions, and the branches reflected there.
     pub const ROLE_BRANCHES: u32 = 2;
+    /// Threads of a work group of paths.
+    pub const TRACE_GROUP: u32 = 64;
     /// Smallest probability with which a faint branch is followed.
     pub const LEAST_SURVIVAL: f32 = 1.0 / 32.0;
-    /// Paths that one thread follows one after the other at an interaction.
-    pub const ECHO_BLOCK: u32 = 8;
 
     /// Curved array.
     pub const KIND_CONVEX: u32 = 0;

@@ -212,7 +212,7 @@ impl Passes {
         let path_end = self.frame().paths.min(path_begin + self.batches.paths);
         cmd.scope("trace");
         for round in self.batches.rounds.of(self.frame(), path_begin..path_end, turn) {
-            let threads = Extent::Threads([round.workers, 1, 1]);
+            let threads = Extent::Threads(round.threads());
             let push = bytemuck::cast_slice(&round.push);
             self.record(cmd, &TRACE[round.role as usize], threads, push, &|_| Vec::new())?;
         }

@@ -3,9 +3,10 @@
 use std::ops::Range;
 
 use super::layout::{
-    self, ECHO_BLOCK, FLAG_ROUGH_TRANSMISSION, Frame, Interaction, ROLE_BRANCHES, ROLE_MAIN,
-    ROLE_WHOLE, SAMPLING_MAIN_PATH,
+    self, FLAG_ROUGH_TRANSMISSION, Frame, Interaction, ROLE_BRANCHES, ROLE_MAIN,
+    ROLE_WHOLE, SAMPLING_MAIN_PATH, TRACE_GROUP,
 };
+use super::stages::TRACE;
 
 /// Largest buffer of interactions, bytes; frames that have more are traced by groups of lines.
 const INTERACTION_BUDGET: u64 = 32 << 20;
@@ -38,11 +39,24 @@ fn path_bytes(frame: &Frame) -> u64 {
     u64::from(slots(frame)) * size_of::<Interaction>() as u64
 }
 
-/// Most threads of a dispatch: four times what the largest GPU runs at once, and far fewer than Vulkan allows.
+/// Workers of a work group where so few leave threads of the device idle all the same. Threads of a group run in step,
+/// and all of them wait for the longest path: H100, 1344 main paths of `abdomen`: 1.51 ms by 64 of a group, 1.28 by 16,
+/// 1.14 by 8.
+const FEW_LANES: u32 = 8;
+
+/// Most workers of a dispatch: four times what the largest GPU runs at once, and far fewer than Vulkan allows.
 const MOST_WORKERS: u32 = 1 << 20;
 
 /// Pieces of work that a worker does one after the other, if there are enough.
 const PIECES: u32 = 8;
+
+/// Most paths that a worker takes one after the other at an interaction, which it then recalls once for all of them.
+const MOST_IN_BLOCK: u32 = 8;
+
+/// Pieces of work for each thread that a device runs at once, below which the blocks are halved: most of the room for
+/// interactions is empty, and a thread that echoes eight times is the last to end. H100, blocks of 1 instead of 8: the
+/// branches of `fetus` take 1.39 instead of 5.31 ms with 32 paths, those of `abdomen` 8.7 instead of 11.6 with 128.
+const SPARE_PIECES: u64 = 16;
 
 /// One dispatch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,17 +64,23 @@ pub struct Round {
     /// The role of its paths: [`ROLE_WHOLE`], [`ROLE_MAIN`] or [`ROLE_BRANCHES`].
     pub role: u32,
     /// Push constants: first path, number of paths, first line, number of lines, pieces of work, most pieces that a
-    /// worker may take, and which of two counters deals them out.
-    pub push: [u32; 7],
-    /// Number of threads. Each takes one piece after the other, so that no thread waits for the longer path of
+    /// worker may take, which of two counters deals them out, paths in a block, and workers of a work group.
+    pub push: [u32; 9],
+    /// Number of workers. Each takes one piece after the other, so that no thread waits for the longer path of
     /// another one.
     pub workers: u32,
 }
 
 impl Round {
+    /// The size of its dispatch: all threads of the work groups in which the workers are.
+    pub fn threads(&self) -> [u32; 3] {
+        let [.., lanes] = self.push;
+        [self.workers.div_ceil(lanes) * TRACE_GROUP, 1, 1]
+    }
+
     /// Specialization constants, by id, that make `trace` a kernel for one role.
-    pub fn constants(role: u32) -> [(u32, u32); 1] {
-        [(0, role)]
+    pub fn constants(role: u32) -> &'static [(u32, u32)] {
+        TRACE[role as usize].constants
     }
 }
 
@@ -124,11 +144,25 @@ impl Rounds {
         self.main_paths() * u64::from(self.slots)
     }
 
+    /// Paths that a worker takes at an interaction, of `paths` that the main path stands for: as many as leave enough
+    /// pieces of work for the device.
+    fn block(&self, paths: u32) -> u32 {
+        let pieces = |block| self.interactions() * u64::from(paths.div_ceil(block));
+        let enough = SPARE_PIECES * u64::from(self.at_once);
+        let mut block = MOST_IN_BLOCK;
+        while block > 1 && pieces(block) < enough {
+            block /= 2;
+        }
+        block
+    }
+
     /// The dispatches that trace `paths` of all lines, in order, each after the one before. `turn` is the number
     /// of the frame's counter, of two, that the first dispatch uses; it is advanced to the next one.
     pub fn of(&self, frame: &Frame, paths: Range<u32>, turn: &mut u32) -> Vec<Round> {
         let all = frame.scanlines * frame.layers;
         let (begin, count) = (paths.start, paths.len() as u32);
+        let alike = one_speaks_for_all(frame);
+        let block = if alike { self.block(count) } else { 1 };
         let mut round = |role, count, line, lines: u32, per_line: u32| {
             let pieces = lines * per_line;
             let workers = self.at_once.max(pieces / PIECES);
@@ -136,17 +170,16 @@ impl Rounds {
             // Twice an equal share, because pieces of other workers may be larger. Workers that begin later then
             // find none.
             let most = 2 * pieces.div_ceil(workers);
-            let push = [begin, count, line, lines, pieces, most, *turn];
+            let few = workers * (TRACE_GROUP / FEW_LANES) <= self.at_once;
+            let lanes = if few { FEW_LANES } else { TRACE_GROUP };
+            let push = [begin, count, line, lines, pieces, most, *turn, block, lanes];
             *turn ^= 1;
             Round { role, push, workers }
         };
         if self.mains == 0 {
             return vec![round(ROLE_WHOLE, count, 0, all, count)];
         }
-        let (mains, blocks) = match one_speaks_for_all(frame) {
-            true => (1, count.div_ceil(ECHO_BLOCK)),
-            false => (count, 1),
-        };
+        let (mains, blocks) = if alike { (1, count.div_ceil(block)) } else { (count, 1) };
         let mut rounds = Vec::new();
         for first in (0..all).step_by(self.lines as usize) {
             let lines = self.lines.min(all - first);
@@ -200,12 +233,12 @@ mod tests {
             for role in [ROLE_MAIN, ROLE_BRANCHES] {
                 assert_eq!(lines(&taken, role), [1; 192 * 7]);
             }
-            let most = |rounds: &[Round]| rounds.iter().map(|r| r.workers).max();
-            assert!(most(&taken) <= Some(64 * MOST_GROUPS));
+            let most = |rounds: &[Round]| rounds.iter().map(|r| r.threads()[0]).max();
+            assert!(most(&taken) <= Some(TRACE_GROUP * MOST_GROUPS));
             // If one main path serves all paths, one batch holds all paths.
             let all = Rounds::new(&frame, frame.paths, 1 << 18);
             let all = all.of(&frame, 0..frame.paths, &mut 0);
-            assert!(most(&all) <= Some(64 * MOST_GROUPS));
+            assert!(most(&all) <= Some(TRACE_GROUP * MOST_GROUPS));
             // Each dispatch leaves the other counter at zero for the next one.
             assert!(
                 taken.iter().zip([0, 1].into_iter().cycle()).all(|(r, turn)| r.push[6] == turn)
@@ -223,7 +256,7 @@ mod tests {
             rounds.iter().map(|r| r.push[4]).collect::<Vec<_>>()
         };
         let mut frame = frame(40, 32);
-        assert_eq!(pieces(&frame), [1344, 1344 * 32 * 5]);
+        assert_eq!(pieces(&frame), [1344, 1344 * 32 * 40]);
         frame.flags = FLAG_ROUGH_TRANSMISSION;
         let own = pieces(&frame);
         assert_eq!(own[1], 32 * own[0]);
@@ -239,6 +272,14 @@ mod tests {
         assert_eq!(few.main_paths(), 448);
         let taken = few.of(&frame, 0..8, &mut 0);
         assert_eq!(taken.len(), 6);
+        // Main paths of a large GPU are in groups of their own; here all threads of a group are needed.
+        let large = Rounds::new(&frame, 8, 1 << 18).of(&frame, 0..8, &mut 0);
+        assert_eq!(large.iter().map(|r| r.push[8]).collect::<Vec<_>>(), [FEW_LANES, TRACE_GROUP]);
+        assert_eq!(large[0].threads(), [8 * 1344, 1, 1]);
+        assert_eq!(taken[0].push[8], TRACE_GROUP);
+        // Few threads: as many paths at an interaction as a block takes.
+        assert_eq!(taken[1].push[7], MOST_IN_BLOCK);
+        assert_eq!(taken[1].push[4], 448 * 32);
         for role in [ROLE_MAIN, ROLE_BRANCHES] {
             assert_eq!(lines(&taken, role), [1; 192 * 7]);
         }

@@ -68,7 +68,7 @@ pub fn run(
             }
             Extent::Rounds(rounds) => rounds.iter().try_for_each(|round| {
                 let push = bytemuck::cast_slice(&round.push);
-                commands.dispatch(&by_role[&round.role], [round.workers, 1, 1], push, &bindings)?;
+                commands.dispatch(&by_role[&round.role], round.threads(), push, &bindings)?;
                 commands.barrier(Stage::Compute, Stage::Compute);
                 Ok(())
             }),
@@ -87,7 +87,7 @@ pub fn run(
 /// The kernel specialised for each role that occurs in the rounds.
 fn specialized(kernel: &Kernel, rounds: &[Round]) -> Result<BTreeMap<u32, Kernel>, GpuError> {
     let roles: BTreeSet<u32> = rounds.iter().map(|round| round.role).collect();
-    let made = |role| Ok((role, kernel.specialized(&Round::constants(role))?));
+    let made = |role| Ok((role, kernel.specialized(Round::constants(role))?));
     roles.into_iter().map(made).collect()
 }
 
