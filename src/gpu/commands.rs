@@ -1,6 +1,7 @@
 //! Recording of commands: scopes, barriers, dispatches.
 
 use std::sync::Arc;
+use std::time::Instant;
 
 use ash::vk;
 
@@ -199,21 +200,42 @@ impl<'a> Commands<'a> {
             self.use_binding(kernel, info, binding);
         }
         // Commands without a scope are, for instance, uploads.
-        let pieces = self.slot.pieces.as_mut().filter(|_| !self.scope.is_empty());
-        let Some(pieces) = pieces else {
-            self.bind_and_dispatch((kernel, pipeline), push, &sets, [[0; 3], groups]);
+        let dispatch =
+            |this: &Self, piece| this.bind_and_dispatch((kernel, pipeline), push, &sets, piece);
+        let mut all = [[0; 3], groups];
+        let whole = kernel.counts_groups();
+        let Some(pieces) = self.slot.pieces.as_ref().filter(|_| !self.scope.is_empty()) else {
+            dispatch(self, all);
             return Ok(());
         };
-        let (boxes, each_ms) = pieces.cut(&self.scope, groups, kernel.counts_groups());
+        if let Some([ahead, rest]) = pieces.ahead(&self.scope, groups, whole) {
+            let began = self.finish_pieces()?;
+            dispatch(self, ahead);
+            let took = self.finish_pieces()?.duration_since(began);
+            let pieces = self.slot.pieces.as_mut().expect("found above");
+            pieces.tried(&self.scope, ahead, took.as_secs_f64() * 1e3);
+            all = rest;
+        }
+        let pieces = self.slot.pieces.as_mut().expect("found above");
+        let (boxes, each_ms) = pieces.cut(&self.scope, all, whole);
         for piece in boxes {
             let full = self.slot.pieces.as_mut().is_some_and(|p| p.add(each_ms));
             if full {
                 self.slot.cut()?;
                 self.follow();
             }
-            self.bind_and_dispatch((kernel, pipeline), push, &sets, piece);
+            dispatch(self, piece);
         }
         Ok(())
+    }
+
+    fn finish_pieces(&mut self) -> Result<Instant, GpuError> {
+        let done = self.slot.finish_pieces()?;
+        self.follow();
+        if let Some(pieces) = &mut self.slot.pieces {
+            pieces.handed_over();
+        }
+        Ok(done)
     }
 
     fn bind_and_dispatch(

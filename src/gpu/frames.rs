@@ -154,6 +154,18 @@ impl SubmissionSlot {
         }
     }
 
+    /// Hands over the commands recorded so far as [`Self::cut`] and waits until they are done; returns when.
+    pub(crate) fn finish_pieces(&mut self) -> Result<Instant, GpuError> {
+        self.cut()?;
+        if let Some(last) = self.handed.checked_sub(1) {
+            let _compiling = self.device.kept.patience(self.new_kernels.iter().copied());
+            // SAFETY: the fence belongs to a piece that was handed over.
+            unsafe { self.device.raw.wait_for_fences(&[self.piece_fences[last]], true, u64::MAX) }
+                .map_err(|code| self.failure(code, "waiting for a piece of a frame"))?;
+        }
+        Ok(Instant::now())
+    }
+
     fn hand_over(&mut self) -> Result<(), vk::Result> {
         self.began.get_or_insert_with(Instant::now);
         let (raw, at) = (&self.device.raw, self.handed);
@@ -331,10 +343,11 @@ pub struct Frames {
 impl Frames {
     /// Makes the slots; `name` names their Vulkan objects.
     pub fn new(device: &Arc<Device>, name: &str) -> Result<Self, GpuError> {
+        let pieces = Pieces::new(device.queues.are_shared());
         let slot = |index: u32| -> Result<SubmissionSlot, GpuError> {
             let mut slot =
                 SubmissionSlot::new(device, &format!("{name} {index}"), QueueUser::Work)?;
-            slot.pieces = Some(Pieces::new(device.queues.are_shared()));
+            slot.pieces = Some(pieces.in_turn());
             Ok(slot)
         };
         Ok(Self { slots: [slot(0)?, slot(1)?], next: 0, finished: Vec::new(), abandon: None })

@@ -3,8 +3,8 @@
 use std::ops::Range;
 
 use super::layout::{
-    self, FLAG_ROUGH_TRANSMISSION, Frame, Interaction, ROLE_BRANCHES, ROLE_MAIN,
-    ROLE_WHOLE, SAMPLING_MAIN_PATH, TRACE_GROUP,
+    self, FLAG_ROUGH_TRANSMISSION, Frame, Interaction, ROLE_BRANCHES, ROLE_MAIN, ROLE_WHOLE,
+    SAMPLING_MAIN_PATH, TRACE_GROUP,
 };
 use super::stages::TRACE;
 
