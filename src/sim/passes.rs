@@ -10,7 +10,9 @@ use super::lane::{Lane, Shot};
 use super::line::OneLine;
 use super::pass::{Extent, Pass, Sizes, Variants};
 use super::shaders::Library;
-use super::stages::{self, CONVERT, DARKEN, EXPECT, FUSE, MASK, ORIGIN, SCATTER, SHADOW, TRACE};
+use super::stages::{
+    self, CONVERT, DARKEN, EXPECT, FUSE, MASK, ORIGIN, SCATTER, SHADOW, TRACE, scatter,
+};
 use super::tables::Tables;
 use super::{SimError, World, layout};
 use crate::gpu::{Binding, Buffer, Commands, Device, GpuError, Kernel, Stage};
@@ -191,7 +193,9 @@ impl Passes {
         let mut turn = 0;
         for begin in (0..self.frame().paths).step_by(self.batches.paths as usize) {
             self.trace(cmd, begin, &mut turn)?;
-            self.run(cmd, &SCATTER)?;
+            cmd.scope(SCATTER.name);
+            let groups = scatter::extent(self.frame(), self.batches.rounds.at_once);
+            self.record(cmd, &SCATTER, groups, &[], &|_| Vec::new())?;
             if levelled {
                 self.run(cmd, &EXPECT)?;
             }

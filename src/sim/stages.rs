@@ -35,7 +35,7 @@ mod mask;
 mod origin;
 pub(super) mod paint;
 pub(super) mod pyramid;
-mod scatter;
+pub mod scatter;
 mod shadow;
 pub(super) mod tint;
 mod trace;

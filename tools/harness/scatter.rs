@@ -2,7 +2,7 @@
 
 use super::check::relative_norm;
 use super::inputs::{Random, lines, rows, scanlines};
-use super::{Case, Check, Input, Job, Size, Subject, trace, worlds};
+use super::{Case, Check, Extent, Input, Job, Size, Subject, trace, worlds};
 use crate::reference::{Segment, origin, scatter};
 use insonify::sim::layout::{self, Counters, FLAG_VOXEL, Frame};
 use insonify::sim::stages;
@@ -22,6 +22,8 @@ pub const RIGID: Subject = Subject {
                 slab, which are 3.2e-5 mm of its height; in voxel mode 3 %, since 1e-4 \
                 of the samples fall on the other side of a voxel's face",
     job: |case, size| job_of(stiff(scene(case, size)), case),
+    // As for a device that would be idle: several groups share a scanline.
+    extent: Some(|job| Extent::Once(stages::scatter::extent(&job.one("frame"), u32::MAX))),
     check,
     plant: |job, outputs| {
         // Everything one sample too late.
