@@ -16,7 +16,6 @@ mod matching;
 mod reconstruct;
 mod register;
 mod render;
-mod report;
 mod serve;
 mod study;
 mod task;
@@ -89,8 +88,8 @@ fn command() -> Command {
 
 /// Runs the command line. An error is printed once, with its remedy; the exit code is then 1.
 pub fn run() -> ExitCode {
-    report::install();
-    let result = match command() {
+    insonify::issue::tell_errors();
+    output::exit(match command() {
         Command::Acquire(args) => acquire::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Check(check) => check.run(),
         Command::Dataset(args) => dataset::run(&args).map(|()| ExitCode::SUCCESS),
@@ -106,23 +105,7 @@ pub fn run() -> ExitCode {
         Command::Vary(vary) => vary::run(&vary).map(|()| ExitCode::SUCCESS),
         #[cfg(feature = "window")]
         Command::View(view) => view::run(&view).map(|()| ExitCode::SUCCESS),
-    };
-    match result {
-        Ok(code) => match output::failure() {
-            None => code,
-            Some(cause) => {
-                output::note(format!(
-                    "standard output could not be written: {cause}\n\
-                     Files are complete, lines are missing: run it again where there is room for them."
-                ));
-                ExitCode::FAILURE
-            }
-        },
-        Err(report) => {
-            output::note(format!("{report:?}"));
-            ExitCode::FAILURE
-        }
-    }
+    })
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! Findings of checks on files, and mistakes that end the work: place, cause, and remedy.
 
+mod teller;
 mod told;
 
 use std::fmt;
@@ -9,6 +10,7 @@ use std::path::{Path, PathBuf};
 use miette::Diagnostic;
 use thiserror::Error;
 
+pub use teller::tell_errors;
 pub use told::told;
 
 /// Severity of a finding.

@@ -16,6 +16,7 @@ pub mod zea;
 
 use std::fmt::Display;
 use std::io::{ErrorKind, Write, stderr, stdout};
+use std::process::ExitCode;
 use std::sync::OnceLock;
 
 /// The first error that kept a line from standard output, if there was one.
@@ -38,12 +39,32 @@ pub fn note(text: impl Display) {
     let _ = writeln!(stderr(), "{text}");
 }
 
+/// Returns the exit code of a program that ended so, and tells the error, or that lines of its output are missing.
+pub fn exit(ended: miette::Result<ExitCode>) -> ExitCode {
+    match ended {
+        Ok(code) => match failure() {
+            None => code,
+            Some(cause) => {
+                note(format!(
+                    "standard output could not be written: {cause}\n\
+                     Files are complete, lines are missing: run it again where there is room for them."
+                ));
+                ExitCode::FAILURE
+            }
+        },
+        Err(report) => {
+            note(format!("{report:?}"));
+            ExitCode::FAILURE
+        }
+    }
+}
+
 /// The same without the end of the line, for progress that is written over.
 pub fn progress(text: impl Display) {
     let _ = write!(stderr(), "{text}");
 }
 
 /// Returns the reason for which lines are missing in standard output, if some are.
-pub fn failure() -> Option<&'static str> {
+fn failure() -> Option<&'static str> {
     FAILURE.get().map(String::as_str)
 }

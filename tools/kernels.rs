@@ -64,8 +64,13 @@ enum Extent {
     Standard,
 }
 
-fn main() -> Result<ExitCode> {
+fn main() -> ExitCode {
     prepare_process();
+    insonify::issue::tell_errors();
+    insonify::output::exit(program())
+}
+
+fn program() -> Result<ExitCode> {
     let arguments = Arguments::parse();
     let library = Library::embedded();
     if let Command::List = arguments.command {

@@ -89,8 +89,13 @@ struct Machine {
     provenance: Provenance,
 }
 
-fn main() -> Result<ExitCode> {
+fn main() -> ExitCode {
     prepare_process();
+    insonify::issue::tell_errors();
+    insonify::output::exit(program())
+}
+
+fn program() -> Result<ExitCode> {
     let arguments = Arguments::parse();
     let device = Device::new(&DeviceOptions {
         selector: arguments.device.clone(),

@@ -28,8 +28,13 @@ struct Arguments {
     validate: bool,
 }
 
-fn main() -> Result<ExitCode> {
+fn main() -> ExitCode {
     prepare_process();
+    insonify::issue::tell_errors();
+    insonify::output::exit(program())
+}
+
+fn program() -> Result<ExitCode> {
     let arguments = Arguments::parse();
     let mut checks = rows::all();
     let rows: Vec<&str> = checks.iter().map(|c| c.row).collect();

@@ -172,8 +172,11 @@ impl Instance {
         }
         let changing = loader_changes();
         // SAFETY: all pointers in `info` outlive the call; layers and extensions are offered.
-        let raw = unsafe { entry.create_instance(&info, None) }
-            .map_err(during("creating the Vulkan instance"))?;
+        let raw = unsafe { entry.create_instance(&info, None) }.map_err(|code| match code {
+            // The loader's word for a machine without a single driver that answers.
+            vk::Result::ERROR_INCOMPATIBLE_DRIVER => GpuError::NoDevice { seen: String::new() },
+            code => during("creating the Vulkan instance")(code),
+        })?;
         drop(changing);
         let mut instance = Self {
             raw,

@@ -86,6 +86,20 @@ fn a_reader_that_leaves_is_no_error() {
 }
 
 #[test]
+fn a_machine_without_a_driver_is_told_what_to_install() {
+    let mut command = kernels(&["check"]);
+    command.env("VK_DRIVER_FILES", "/no/driver.json").env("VK_ICD_FILENAMES", "/no/driver.json");
+    let out = command.output().expect("the program starts");
+    let said = text(&out.stderr);
+    assert!(!out.status.success(), "{said}");
+    assert!(
+        said.starts_with("error: no usable Vulkan device")
+            && said.contains("; install a GPU driver"),
+        "{said}"
+    );
+}
+
+#[test]
 fn kernels_agree_with_their_twins_on_a_second_driver() {
     let manifest = root().join("target/second-driver/vk_swiftshader_icd.json");
     if !manifest.exists() {

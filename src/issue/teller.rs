@@ -1,13 +1,15 @@
-//! Errors of commands as they are printed.
+//! Errors of programs as they are printed.
 
 use std::fmt::{Formatter, Result};
 use std::io::{IsTerminal, stderr};
 
-use insonify::issue::told;
 use miette::{Diagnostic, ReportHandler};
 
-/// Makes errors of all commands appear in the same form.
-pub fn install() {
+use super::told;
+
+/// Makes an error that ends this program appear as cause and remedy, with `error:` before it. To be called once, when
+/// the program begins.
+pub fn tell_errors() {
     let red = stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty());
     miette::set_hook(Box::new(move |_| Box::new(Teller { red }))).expect("set once");
 }
