@@ -194,7 +194,8 @@ impl Passes {
         for begin in (0..self.frame().paths).step_by(self.batches.paths as usize) {
             self.trace(cmd, begin, &mut turn)?;
             cmd.scope(SCATTER.name);
-            let groups = scatter::extent(self.frame(), self.batches.rounds.at_once);
+            let [threads, ..] = self.kernels.of(&SCATTER, self.world.deforms()).local_size();
+            let groups = scatter::extent(self.frame(), self.batches.rounds.at_once / threads);
             self.record(cmd, &SCATTER, groups, &[], &|_| Vec::new())?;
             if levelled {
                 self.run(cmd, &EXPECT)?;

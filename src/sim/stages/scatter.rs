@@ -26,9 +26,6 @@ pub const SCATTER: Pass = Pass {
     ..Pass::USUAL
 };
 
-/// Threads of a work group.
-const THREADS: u32 = 64;
-
 /// Parts into which the segments of a scanline are divided to keep a large GPU busy. Each part weighs all segments
 /// against each other once more, so that more of them are slower again: H200, segments of 7 layers, 1 / 2 / 4 / 8
 /// parts: `heart` 1.69 / 1.22 / 1.03 / 1.19 ms, `abdomen` 1.34 / 1.17 / 0.97 / 1.00. Without a GPU 4 parts take a third
@@ -36,8 +33,8 @@ const THREADS: u32 = 64;
 const MOST_PARTS: u32 = 4;
 
 /// Work groups per scanline, part of its segments, and window of its samples, for a device that runs about `at_once`
-/// threads at once. Long lists of segments are divided among groups, and so are short ones where they leave the device
-/// idle; each group clears and writes its own window.
+/// groups at once. Long lists of segments are divided among groups, and so are short ones where they leave more than half
+/// of the device idle; each group clears and writes its own window.
 pub fn extent(frame: &Frame, at_once: u32) -> Extent {
     // The scatterers of lines beside one that is made alone are not heard: see the kernel.
     let alone = frame.flags & (FLAG_LINE | FLAG_VOXEL) == FLAG_LINE;
@@ -45,7 +42,7 @@ pub fn extent(frame: &Frame, at_once: u32) -> Extent {
     let windows = frame.samples.div_ceil(SCATTER_WINDOW);
     let paths = frame.segment_capacity / per_path(frame);
     let long = paths.div_ceil(8).clamp(1, 16);
-    let idle = at_once / (2 * THREADS * lines * windows).max(1);
+    let idle = at_once / (2 * lines * windows).max(1);
     Extent::Groups([lines, long.max(idle.min(MOST_PARTS)), windows])
 }
 
@@ -62,9 +59,9 @@ mod tests {
             Extent::Threads(_) => unreachable!("work groups"),
         };
         let long = groups(&frame, 0)[1];
-        assert_eq!(groups(&frame, 512), [192, long, 2]);
-        assert_eq!(groups(&frame, 1 << 18), [192, long.max(MOST_PARTS), 2]);
+        assert_eq!(groups(&frame, 8), [192, long, 2]);
+        assert_eq!(groups(&frame, 1 << 12), [192, long.max(MOST_PARTS), 2]);
         let line = Frame { flags: FLAG_LINE, ..frame };
-        assert_eq!(groups(&line, 1 << 18), [1, long.max(MOST_PARTS), 2]);
+        assert_eq!(groups(&line, 1 << 12), [1, long.max(MOST_PARTS), 2]);
     }
 }
