@@ -1,5 +1,8 @@
 // From accumulators to complex samples: fixed point to float, lateral smoothing, contact, noise.
 //
+// Surfaces' echoes are smoothed to the width of the beam; those of scatterers, each heard by the lines in whose strips it
+// lies, by what the strip lacks of it. Point targets are as wide as the beam already.
+//
 // A thread computes one sample of BEAM_LINES neighbouring scanlines: it reads an echo once for all of
 // them that it reaches. Neighbouring threads read neighbouring samples of the same scanline.
 #version 460
@@ -17,12 +20,19 @@ layout(std430, binding = 5) restrict buffer LateralBuffer { vec2 lateral[]; };
 // For each scanline of the face the coupled share of the transmit aperture; then, for each element, the
 // number of elements before it that are not coupled.
 layout(std430, binding = 6) restrict readonly buffer ContactBuffer { float contact[]; };
+layout(std430, binding = 7) restrict readonly buffer PointBuffer { ivec2 point_echoes[]; };   // where there are point targets
 
 const int HEADROOM = int(ECHO_LIMIT);
 
 bool saturated(ivec2 v) { return any(greaterThanEqual(v, ivec2(HEADROOM))) || any(lessThanEqual(v, ivec2(-HEADROOM))); }
 
 #include "contact.glsl"
+
+// Lines on each side over which a Gaussian of this deviation smooths; it is cut there.
+int reach_of(float sigma) { return sigma < 0.05 ? 0 : int(min(ceil(3.0 * sigma), float(LATERAL_REACH))); }
+
+// Its exponent per line^2. Without smoothing that of the only tap, j = 0, is 0 whatever this is.
+float falloff_of(float sigma) { return -0.5 / max(sigma * sigma, 0.0025); }
 
 void main() {
     uint k = gl_GlobalInvocationID.x;
@@ -31,31 +41,30 @@ void main() {
     int scanlines = int(frame.scanlines);
     if (k >= frame.samples) { return; }
 
-    float sigma = rows[k].lateral_lines;
-    int radius = sigma < 0.05 ? 0 : int(min(ceil(3.0 * sigma), float(LATERAL_REACH)));
-    // Without smoothing the exponent of the only tap, j = 0, is 0 whatever this is.
-    float falloff = -0.5 / max(sigma * sigma, 0.0025);
-    bool voxel = (frame.flags & FLAG_VOXEL) != 0u;
+    // Of surfaces, and of scatterers.
+    int surface_reach = reach_of(rows[k].lateral_lines), volume_reach = reach_of(rows[k].strip_lines);
+    vec2 falloff = vec2(falloff_of(rows[k].lateral_lines), falloff_of(rows[k].strip_lines));
+    int reach_both = max(surface_reach, volume_reach);
 
     vec2 s[BEAM_LINES];
     vec2 v[BEAM_LINES];
     float weights[BEAM_LINES];
     float energies[BEAM_LINES];
-    // tap[n] is the weight, in output scanline first + n, of the scanline that is being read.
-    float tap[BEAM_LINES];
+    // tap[n] are the weights, in output scanline first + n, of the scanline that is being read.
+    vec2 tap[BEAM_LINES];
     for (int n = 0; n < BEAM_LINES; ++n) {
         s[n] = vec2(0.0);
         v[n] = vec2(0.0);
         weights[n] = 0.0;
         energies[n] = 0.0;
-        tap[n] = 0.0;
+        tap[n] = vec2(0.0);
     }
     float energy_full = 0.0;
     uint full = 0u;
-    for (int j = -radius; j < BEAM_LINES + radius; ++j) {
+    for (int j = -reach_both; j < BEAM_LINES + reach_both; ++j) {
         for (int n = BEAM_LINES - 1; n > 0; --n) { tap[n] = tap[n - 1]; }
-        tap[0] = j <= radius ? exp(falloff * float(j * j)) : 0.0;
-        energy_full += tap[0] * tap[0];
+        tap[0] = mix(vec2(0.0), exp(falloff * float(j * j)), lessThanEqual(ivec2(abs(j)), ivec2(surface_reach, volume_reach)));
+        energy_full += tap[0].y * tap[0].y;
         int line = first + j;
         if (line < 0 || line >= scanlines) { continue; }
         uint at = uint(line * samples) + k;
@@ -63,15 +72,15 @@ void main() {
         if (j >= 0 && j < BEAM_LINES && saturated(echo)) { full |= 1u << uint(j); }
         vec2 e = vec2(echo);
         for (int n = 0; n < BEAM_LINES; ++n) {
-            weights[n] += tap[n];
-            s[n] += tap[n] * e;
+            weights[n] += tap[n].x;
+            s[n] += tap[n].x * e;
         }
-        if (voxel) {
-            vec2 e = vec2(volume_echoes[at]);
-            for (int n = 0; n < BEAM_LINES; ++n) {
-                energies[n] += tap[n] * tap[n];
-                v[n] += tap[n] * e;
-            }
+        echo = volume_echoes[at];
+        if (j >= 0 && j < BEAM_LINES && saturated(echo)) { full |= 1u << uint(j); }
+        e = vec2(echo);
+        for (int n = 0; n < BEAM_LINES; ++n) {
+            energies[n] += tap[n].y * tap[n].y;
+            v[n] += tap[n].y * e;
         }
     }
     float surface_undo = rows[k].surface_undo;
@@ -81,11 +90,13 @@ void main() {
         uint l = uint(first + n);
         if (l >= frame.scanlines) { break; }
         uint own = l * frame.samples + k;
-        ivec2 echo = volume_echoes[own];
-        if (saturated(echo)) { full |= 1u << uint(n); }
         // Speckle adds in power, surface echoes add in amplitude; each is normalised to keep its level at the edges.
-        vec2 scatterers = vec2(echo);
-        if (voxel) { scatterers = v[n] * sqrt(energy_full / energies[n]); }
+        vec2 scatterers = v[n] * sqrt(energy_full / energies[n]);
+        if (frame.points > 0u) {
+            ivec2 points = point_echoes[own];
+            if (saturated(points)) { full |= 1u << uint(n); }
+            scatterers += vec2(points);
+        }
         vec2 iq = (s[n] * (surface_undo / weights[n]) + scatterers * volume_undo) * coupling(l, reach);
         if (frame.noise > 0.0) {
             uvec4 bits = pcg4d(uvec4(frame.first_line + l, k, frame.frame_index, frame.seed));

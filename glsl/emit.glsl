@@ -35,6 +35,13 @@ bool paths_are_alike() {
         && (frame.flags & FLAG_ROUGH_TRANSMISSION) == 0u;
 }
 
+// Distance between the paths of neighbouring scanlines, mm, and its growth per mm in a medium of speed c: what a main path
+// has carried here. Reflected ones, whose neighbours may have been reflected elsewhere, are as far apart as scanlines are.
+vec2 strip_of(inout Path path, vec2 nominal) {
+    if (path.reflections > 0u) return nominal;
+    return path.strip.x < 0.0 ? -path.strip : path.strip;
+}
+
 // Writes a segment, unless another path writes it. Its weight and share say which part of the volume echoes this path
 // stands for, and over how many paths they average.
 void emit_segment(inout Path path, uint line, uint n, uint instance, float extent) {
@@ -58,9 +65,18 @@ void emit_segment(inout Path path, uint line, uint n, uint instance, float exten
     segments[at].direction_time = vec4(path.direction, path.time);
     segments[at].lateral_weight = vec4(path.lateral, weight);
     segments[at].spread = vec4(path.spread, share);
-    segments[at].lens = vec4(path.lens, float(path.reflections));
+    vec2 pitch = line_pitch();
+    float speed = tissues[tissue].speed;
+    vec2 nominal = vec2(pitch.x + pitch.y * frame.speed * path.time, pitch.y * frame.speed / speed);
+    vec2 strip = strip_of(path, nominal);
+    vec2 ratios = vec2(strip.x, abs(strip.x + extent * strip.y)) / max(vec2(nominal.x, nominal.x + extent * nominal.y), vec2(LEAST_PITCH));
+    // Where all scanlines meet their distance says nothing.
+    if (nominal.x > LEAST_PITCH && (any(greaterThan(ratios, vec2(STRIP_LIMIT))) || any(lessThan(ratios, vec2(1.0 / STRIP_LIMIT))))) {
+        atomicAdd(counters.strips_limited, 1u);
+    }
+    segments[at].lens = vec4(path.lens, strip.y);
     segments[at].tissue = tissue;
     segments[at].instance = instance;
-    segments[at].line = line;
-    segments[at].handedness = path.handedness;
+    segments[at].line = line | (path.reflections > 0u ? REFLECTED : 0u);
+    segments[at].strip = path.handedness * max(strip.x, LEAST_PITCH);
 }

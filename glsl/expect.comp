@@ -42,11 +42,10 @@ float power_of(Stretch s, uint k, uint layer) {
     float from = max(kappa_at(s, 0.0), float(k) - 0.5), to = min(kappa_at(s, s.extent), float(k) + 0.5);
     if (!(to > from)) return 0.0;
     float x = distance_at(s, 0.5 * (from + to));
-    vec4 shape = rows[k].shape;
-    float amplitude = s.weight * thinning(s, x, shape) * exp(-s.absorption * x) * exp2(tissues[s.tissue].level);
+    float amplitude = s.weight * thinning(s, x, k) * exp(-s.absorption * x) * exp2(tissues[s.tissue].level);
     float power = amplitude * amplitude;
     // In faster tissue a sample is longer and holds more scatterers.
-    if ((frame.flags & FLAG_VOXEL) == 0u) power *= s.speed / frame.speed * sqrt(narrowing(s, x, INVERSE_FALL * shape.x));
+    if ((frame.flags & FLAG_VOXEL) == 0u) power *= s.speed / frame.speed * sqrt(narrowing(s, x, k));
     return power * (to - from) * speckle[k * frame.layers + layer];
 }
 

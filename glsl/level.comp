@@ -26,7 +26,7 @@ void main() {
     int samples = int(frame.samples);
     if (k >= samples || l >= frame.scanlines) return;
     int line = int(l) * samples;
-    // The axial kernel sums amplitudes; of scatterers, whose phases are random, it sums powers.
+    // The kernels across and along the lines sum amplitudes; of scatterers, whose phases are random, they sum powers.
     float sigma = frame.axial_sigma;
     int radius = int(min(ceil(4.0 * sigma), float(AXIAL_REACH)));
     vec2 speckle = vec2(0.0);
@@ -34,9 +34,21 @@ void main() {
     for (int j = -radius; j <= radius; ++j) {
         float tap = j == 0 ? 1.0 : exp(-float(j * j) / (sigma * sigma));
         whole += tap;
-        if (k + j < 0 || k + j >= samples) continue;
-        uvec4 sums = expected[line + k + j];
-        speckle += tap * vec2(power_of(sums.xy), power_of(sums.zw));
+        int at = k + j;
+        if (at < 0 || at >= samples) continue;
+        float lines = rows[at].strip_lines;
+        int reach = lines < 0.05 ? 0 : int(min(ceil(3.0 * lines), float(LATERAL_REACH)));
+        vec2 across = vec2(0.0);
+        float inside = 0.0;
+        for (int i = -reach; i <= reach; ++i) {
+            int beside = int(l) + i;
+            if (beside < 0 || beside >= int(frame.scanlines)) continue;
+            float share = i == 0 ? 1.0 : exp(-float(i * i) / (lines * lines));
+            inside += share;
+            uvec4 sums = expected[beside * samples + at];
+            across += share * vec2(power_of(sums.xy), power_of(sums.zw));
+        }
+        speckle += tap * across / inside;
     }
     float coupled = coupling(l, rows[k].receive_reach);
     speckle *= coupled * coupled / whole;

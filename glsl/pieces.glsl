@@ -7,7 +7,7 @@ const float MOST_SQUEEZED = 2.5;
 
 vec3 bounded(vec3 v) { return v * min(1.0, MOST_SQUEEZED * inversesqrt(max(dot(v, v), 1e-12))); }
 
-// Echo of a scatterer of deformed tissue at `rel` from the stretch's origin, if it is within the beam, the
+// Echo of a scatterer of deformed tissue at `rel` from the stretch's origin, if it is within the strip, the
 // slab of the layer and the range `x` along the beam. Returns 1 if it is, and the number of samples that could not hold it.
 uvec2 hear(Stretch s, vec3 rel, float strength, int number, vec2 x, float drowned) {
     float along = dot(rel, s.d);
@@ -18,13 +18,15 @@ uvec2 hear(Stretch s, vec3 rel, float strength, int number, vec2 x, float drowne
     uint row = row_at(kappa);
     float across = dot(rel, s.e_l);
     vec4 shape = shape_at(s, row);
-    if (abs(across) > half_width(s, shape)) return uvec2(0u);
+    if (!(half_width(s, shape, along) > 0.0)) return uvec2(0u);
+    float share = strip_share(across, shape.x, rows[row].strip_core, strip_ratio(s, along));
+    if (!(share > 0.0)) return uvec2(0u);
     float power = level_power(wanted_level(s.tissue, shape.w, drowned), number);
     if (!(power > 0.0)) return uvec2(0u);
     up += s.layer_y;
-    float exponent = shape.z - s.absorption * LOG2_E * along - shape.x * across * across - shape.y * up * up;
+    float exponent = shape.z - s.absorption * LOG2_E * along - shape.y * up * up;
     float turns = 2.0 * frame.frequency * (s.time + along / s.speed);
-    strength *= sqrt(power) * thinning(s, along, shape);
+    strength *= share * sqrt(power) * thinning(s, along, row);
     return uvec2(1u, deposit_near(kappa, strength * exp2(exponent) * phasor(-turns)));
 }
 

@@ -19,15 +19,26 @@ uvec3 march_sample(Stretch s, int k) {
         factor += tissues[s.tissue].texture_depth * tissue_texture(p / tissues[s.tissue].texture_length, seed);
     }
     float amplitude = s.weight * factor * exp(-0.5 * e * e - s.absorption * x)
-        * thinning(s, x, rows[row].shape)
+        * thinning(s, x, row)
         * (tissues[s.tissue].mean + tissues[s.tissue].sigma * gaussian(bits.w));
     float kappa = float(k) + unit(bits.x) - 0.5;
     vec2 q = amplitude * frame.volume_scale * carrier(kappa * frame.sample_pitch / frame.speed);
     return uvec3(1u, 1u, deposit_near(kappa, q * rows[row_at(kappa + 0.5)].volume_gain));
 }
 
-// Adds the echo of one point target; returns the number of samples for which the value is too large.
-uint march_point(Stretch s, vec4 point) {
+// Adds to a sample of the window of a scanline's point targets; returns 1 if the value is too large.
+uint deposit_point(uint scanline, int slot, vec2 v) {
+    if (slot >= 0 && slot < int(min(SCATTER_WINDOW, frame.samples - window_begin))) {
+        vec2 held = clamp(v, vec2(-ECHO_LIMIT), vec2(ECHO_LIMIT));
+        uint at = 2u * (scanline * frame.samples + window_begin + uint(slot));
+        atomicAdd(point_echoes[at], whole_large(floor(held.x + 0.5)));
+        atomicAdd(point_echoes[at + 1u], whole_large(floor(held.y + 0.5)));
+    }
+    return uint(!(max(abs(v.x), abs(v.y)) < ECHO_LIMIT));
+}
+
+// Adds the echo of one point target, as wide as the beam, to a scanline; returns the number of samples for which the value is too large.
+uint march_point(Stretch s, uint scanline, vec4 point) {
     vec3 rel = point.xyz - s.o;
     float x = dot(rel, s.d);
     if (!(x >= 0.0 && x < s.extent)) return 0u;
@@ -41,18 +52,18 @@ uint march_point(Stretch s, vec4 point) {
     float at = frame.speed * time / frame.sample_pitch;
     uint row = row_at(at);
     float sigma_l = rows[row].sigma_lateral, sigma_e = rows[row].sigma_elevation;
-    float narrow = narrowing(s, x, 1.0 / (sigma_l * sigma_l));
+    float narrow = narrowing(s, x, row);
     float l = rho_l * sqrt(narrow) / sigma_l;
     if (abs(l) > 4.0) return 0u;
     float e = (s.layer_y + rho_e) / sigma_e;
-    vec2 q = s.weight * point.w * sqrt(narrow) * exp(-0.5 * (l * l + e * e) - s.absorption * x) * thinning(s, x, rows[row].shape)
+    vec2 q = s.weight * point.w * sqrt(narrow) * exp(-0.5 * (l * l + e * e) - s.absorption * x) * thinning(s, x, row)
         * frame.volume_scale * carrier(time);
     vec4 shares = deposit_shares(at - floor(at));
     int slot = int(clamp(floor(at), -1e6, 1e9)) - 1 - int(window_begin);
     uint saturated = 0u;
     for (int i = 0; i < 4; ++i) {
         uint k = uint(clamp(slot + i + int(window_begin), 0, int(frame.samples) - 1));
-        saturated += deposit_at(slot + i, q * (shares[i] * rows[k].point_gain));
+        saturated += deposit_point(scanline, slot + i, q * (shares[i] * rows[k].point_gain));
     }
     return saturated;
 }

@@ -21,6 +21,12 @@ void probe_ray(uint l, uint e, out vec3 origin, out vec3 direction, out vec3 lat
     lateral = vec3(direction.z, 0.0, -direction.x);
 }
 
+// Distance between neighbouring scanlines where sound leaves the face, mm, and its growth per mm of depth.
+vec2 line_pitch() {
+    vec2 of_all = frame.kind == KIND_LINEAR ? vec2(frame.width, 0.0) : vec2(frame.radius, 1.0) * frame.field_of_view;
+    return of_all / float(face_lines());
+}
+
 // Axial sample at `kappa` pitches along a line, limited to the ends; 0 for NaN.
 uint sample_at(float kappa) {
     return uint(whole(floor(clamp(mix(0.0, kappa, kappa > 0.0), 0.0, float(frame.samples - 1u)))));

@@ -1,6 +1,7 @@
 // variants: rigid deforming(DEFORMING_TISSUE)
 #version 460
-// Echoes of scatterers and point targets along the segments of one scanline. One workgroup owns one
+// Echoes of scatterers and point targets along the segments of one scanline. A scanline hears the scatterers of its own
+// strip, which beam spreads over its neighbours, and all point targets in its beam. One workgroup owns one
 // (scanline, chunk of its segments, window of samples) and gathers in shared memory, so that global
 // atomics happen once per sample. A thread works on one segment in one bin of samples.
 #extension GL_GOOGLE_include_directive : require
@@ -21,6 +22,7 @@ layout(std430, binding = 7) restrict buffer VolumeEchoBuffer { int volume_echoes
 layout(std430, binding = 8) restrict buffer CounterBuffer { Counters counters; };
 layout(std430, binding = 9) restrict readonly buffer ScanlineBuffer { Scanline scanlines[]; };
 layout(std430, binding = 10) restrict readonly buffer FieldBuffer { vec4 fields[]; };   // of the deforming one
+layout(std430, binding = 11) restrict buffer PointEchoBuffer { int point_echoes[]; };   // where there are point targets
 
 // True if any instance's tissue deforms. Two modules, as not every driver removes the code that a specialization
 // constant switches off, and the code for deformed tissue is the larger half.
@@ -106,17 +108,18 @@ uint deposit_near(float kappa, vec2 v) {
     return saturated;
 }
 
-// Half the beam's width at a row, mm: the beam's section is an ellipse, of which the
-// edge of the layer nearest to the middle is taken.
-float half_width(Stretch s, vec4 shape) {
-    float nearest = max(abs(s.layer_y) - frame.elevation_reach, 0.0);
-    float height = nearest / frame.lateral_cut;
-    return frame.lateral_cut * sqrt(max(1.0 - INVERSE_FALL * shape.y * height * height, 0.0) / (INVERSE_FALL * shape.x));
+// Half the strip's width for the shape of a row, at distance x, mm; 0 where the whole layer lies beyond the beam's edge in elevation.
+float half_width(Stretch s, vec4 shape, float x) {
+    float nearest = max(abs(s.layer_y) - frame.elevation_reach, 0.0) / frame.elevation_cut;
+    return INVERSE_FALL * shape.y * nearest * nearest < 1.0 ? shape.x * strip_ratio(s, x) : 0.0;
 }
 
+// How far a scatterer may lie from the middle of its cell, of edge h, in a direction e of the lattice's space.
+float jitter(float h, vec3 e) { return 0.5 * h * dot(abs(e), vec3(1.0)); }
+
 // Echoes of the scatterers of one lattice near a stretch, plane by plane. x: range of the distances of crossed planes
-// that belong to this work. A cell counts if its centre is within the beam's width, taken where the
-// axis crosses the plane's middle, and within the layer's slab; its scatterer, if it is within the stretch's ends.
+// that belong to this work. A cell counts if its centre is within the layer's slab; its scatterer, if it is within
+// the strip and within the stretch's ends. The strip's width is that where the axis crosses the plane's middle.
 uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
     Lattice lattice = lattice_of(s.tissue, number);
     Walk walk = walk_of(s.d, s.e_l, s.e_e);
@@ -139,6 +142,7 @@ uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
     turns_middle -= floor(turns_middle);
     float turns_per_mm = 2.0 * frame.frequency / s.speed;
     vec2 slab = slab_of();
+    float beside = jitter(h, s.e_l);
     uint span = max(uint(SHAPE_SPAN / frame.sample_pitch), 1u);
     ivec3 step_a = unit_step(walk.a), step_b = unit_step(walk.b), step_c = unit_step(walk.c);
 
@@ -150,9 +154,9 @@ uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
         vec4 shape = shape_at(s, row);
         float wanted = wanted_level(s.tissue, shape.w, drowned);
         float power = level_power(wanted, number);
-        float width = half_width(s, shape);
-        if (!(power > 0.0) || !(width > 0.0)) continue;
         float x_plane = x_middle + ahead;
+        float width = half_width(s, shape, x_plane);
+        if (!(power > 0.0) || !(width > 0.0)) continue;
 
         // Over the plane the beam's shape and the gain vary as a parabola through samples on both sides.
         uint below = row - min(row, span), above = min(row + span, frame.samples - 1u);
@@ -163,21 +167,23 @@ uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
         // The values of a row belong to the middle of its sample.
         float row_ahead = (float(row) + 0.5 - kappa_middle) / per_mm;
 
-        float strength = lattice.amplitude * sqrt(power) * s.weight * thinning(s, x_plane, shape) * frame.volume_scale;
+        float core = rows[row].strip_core;
+        float reach = 1.05 * width + beside;
+        float strength = lattice.amplitude * sqrt(power) * s.weight * thinning(s, x_plane, row) * frame.volume_scale;
         if (depth > 0.0) {
             strength *= 1.0 + depth * tissue_texture((s.o + x_plane * s.d) / tissues[s.tissue].texture_length, tissues[s.tissue].seed);
         }
         float falling = s.absorption * LOG2_E;
         float constant = here.z - s.absorption * LOG2_E * x_middle;
 
-        ivec2 row_range = cells_between(row_ends(walk, da, width, slab.y), rest[walk.b], inverse_h);
+        ivec2 row_range = cells_between(row_ends(walk, da, reach, slab.y), rest[walk.b], inverse_h);
         // Rows and their cells in one loop, so that nearly all threads of a group have a cell in each step.
         int j = row_range.x - 1;
         ivec2 column = ivec2(0);
         while (j < row_range.y) {
             if (column.x >= column.y) {
                 j += 1;
-                column = columns_between(walk, vec2(da, (float(j) + 0.5) * h - rest[walk.b]), width, slab, rest[walk.c], inverse_h);
+                column = columns_between(walk, vec2(da, (float(j) + 0.5) * h - rest[walk.b]), reach, slab, rest[walk.c], inverse_h);
             }
             ivec3 at = i * step_a + j * step_b + column.x * step_c;
             bool counts = column.x < column.y && j < row_range.y;
@@ -192,8 +198,10 @@ uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
             float up = s.layer_y + dot(rel, s.e_e);
             float off_row = dx - row_ahead;
             vec3 change = off_row * (slope + off_row * bend);
-            float exponent = constant + change.z - falling * dx - (here.x + change.x) * across * across - (here.y + change.y) * up * up;
-            vec2 v = strength * exp2(exponent) * phasor(-(turns_middle + dx * turns_per_mm));
+            float share = strip_share(across, here.x + change.x, core, strip_ratio(s, along));
+            if (!(share > 0.0)) continue;
+            float exponent = constant + change.z - falling * dx - (here.y + change.y) * up * up;
+            vec2 v = strength * share * exp2(exponent) * phasor(-(turns_middle + dx * turns_per_mm));
             v *= mix(-1.0, 1.0, (bits.z & 1u) == 0u);
             count.y += 1u;
             count.z += deposit_near(kappa_middle + dx * per_mm, v);
@@ -202,9 +210,9 @@ uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
     return count;
 }
 
-// Half the beam's width at the wider end of a piece.
+// Half the strip's width at the wider end of a piece.
 float end_width(Stretch s, vec2 x) {
-    return max(half_width(s, shape_at(s, row_at(kappa_at(s, x.x)))), half_width(s, shape_at(s, row_at(kappa_at(s, x.y)))));
+    return max(half_width(s, shape_at(s, row_at(kappa_at(s, x.x))), x.x), half_width(s, shape_at(s, row_at(kappa_at(s, x.y))), x.y));
 }
 
 // Largest distance along the beam between a cell's scatterer and the crossing of its plane.
@@ -212,7 +220,7 @@ float plane_margin(Stretch s, vec2 x, int number) {
     Walk walk = walk_of(s.d, s.e_l, s.e_e);
     float width = end_width(s, x);
     return 0.51 * lattice_edge(number) * (abs(s.d.x) + abs(s.d.y) + abs(s.d.z))
-        + (1.2 * width + frame.elevation_reach * abs(walk.slant)) * abs(walk.along.y / walk.across.y)
+        + (1.2 * width + jitter(lattice_edge(number), s.e_l) + frame.elevation_reach * abs(walk.slant)) * abs(walk.along.y / walk.across.y)
         + frame.elevation_reach * abs(s.d[walk.c] * walk.inverse_c);
 }
 
@@ -298,9 +306,7 @@ ivec2 work_of(Stretch s, bool voxel) {
 }
 
 void main() {
-    // Of one line alone only its own scatterers are heard, but for voxels, which are smoothed like surfaces.
-    bool alone = (frame.flags & (FLAG_LINE | FLAG_VOXEL)) == FLAG_LINE;
-    uint scanline = alone ? uint(frame.image_left) : gl_WorkGroupID.x;
+    uint scanline = gl_WorkGroupID.x;
     uint thread = gl_LocalInvocationID.x;
     window_begin = gl_WorkGroupID.z * SCATTER_WINDOW;
     bool voxel = (frame.flags & FLAG_VOXEL) != 0u;
@@ -370,7 +376,7 @@ void main() {
             for (uint g = thread; g < groups; g += THREADS) {
                 if (!passes_sphere(w, points[frame.points + g])) continue;
                 uint end = min((g + 1u) * POINT_GROUP, frame.points);
-                for (uint p = g * POINT_GROUP; p < end; ++p) count.z += march_point(w, points[p]);
+                for (uint p = g * POINT_GROUP; p < end; ++p) count.z += march_point(w, scanline, points[p]);
             }
         }
         // Inside the loop: naga loses values that two loops carry when they are used after both.

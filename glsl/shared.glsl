@@ -48,7 +48,12 @@ const uint FLAG_LINE = 2048u;       // the image is one scanline: column image_l
 const float LEAST_FACING = 0.125;   // cosine below which a surface is not taken to be more inclined
 const float LEAST_DESCENT = 0.001;  // part of its way by which a path goes down below a surface that it has met
 const float BENDING_STEP = 0.1;     // mm: how far from the axis the bending of a wavefront is found
+const float BENDING_ANGLE = 0.05;   // rad: largest angle to a path beside the axis by which the growth of its distance is found
 const float MOST_WIDENED = 8.0;     // growth of a beam's variance across behind a lens, over its own
+const float STRIP_LIMIT = 4.0;      // a scanline's strip of scatterers is at most this much wider or narrower than nominal
+const float STRIP_CUT = 2.5;        // deviations of a narrow beam at which its strip ends
+const float LEAST_PITCH = 1e-6;     // mm: smallest distance between scanlines, where all of them meet
+const uint REFLECTED = 0x80000000u; // bit of a segment's line: it was reflected on its way
 
 const uint BLEND_LINEAR = 0u;
 const uint BLEND_SMOOTH = 1u;
@@ -84,7 +89,7 @@ struct Frame {
     float slice_thickness; float speed; float sample_pitch; float frequency;
     uint paths; uint sampling; uint max_interactions; uint max_reflections;
     float min_weight; float volume_floor; uint flags; uint seed;
-    float origin_jitter; float cell; float elevation_reach; float lateral_cut;
+    float origin_jitter; float cell; float elevation_reach; float elevation_cut;
     float surface_scale; float volume_scale; uint segment_capacity; uint background;
     uint instances; uint points; float face_height; float axial_sigma; // sigma_g of the axial kernel, samples
     float noise; float inverse_reference; float inverse_range; uint frame_index;
@@ -133,9 +138,10 @@ struct Instance {
 
 // Per axial sample k, at depth k * sample_pitch.
 struct Row {
-    vec4 shape;                                   // the two-way beam for scatterers, log2: decrease per mm^2 laterally
-                                                  // and in elevation; gain; and the level of the lattice that is as dense
-                                                  // as speckle needs, up to ALL_LEVELS the finest. One read for all four
+    vec4 shape;                                   // how a scanline hears scatterers: half the width of its strip, mm; log2 of
+                                                  // the decrease per mm^2 in elevation; log2 of the gain; and the level of
+                                                  // the lattice that is as dense as speckle needs, up to ALL_LEVELS the
+                                                  // finest. One read for all four
     float sigma_lateral; float sigma_elevation;   // two-way widths, mm
     float volume_gain; float point_gain;          // applied to scatterers and points at deposit
     float surface_gain;                           // elevation normalisation and compensation at deposit
@@ -148,7 +154,10 @@ struct Row {
     float black;                                  // one-way weight times echogenicity that shows as black, log2
     float sigma_wavefront;                        // mm: standard deviation across the refracting wavefront
     float aperture;                               // sine of the angle under which one deviation of it converges
-    float unused;
+    float strip_lines;                            // deviation, in scanline pitches, by which beam smooths scatterers
+    float strip_core;                             // share of the strip's width that is heard whole; to its edges the rest falls to 0;
+                                                  // below 0: a narrow beam, which is heard as it is
+    float unused0; float unused1; float unused2;
 };
 
 // A straight part of a path inside one medium.
@@ -158,8 +167,11 @@ struct Segment {
     vec4 lateral_weight;   // unit lateral axis e_l carried along the path; weight at the origin
     vec4 spread;           // lateral variance a + 2 b x + c x^2 (mm^2) after rough reflections; path share
     vec4 lens;             // lateral offset a + b x + c x^2 (mm) of what comes one deviation beside the beam's axis, by
-                           // surfaces that bend its wavefront; number of reflections on the way
-    uint tissue; uint instance; uint line; float handedness; // e_e = handedness * cross(d, e_l)
+                           // surfaces that bend its wavefront; growth of `strip` per mm
+    uint tissue; uint instance;
+    uint line;             // with REFLECTED
+    float strip;           // distance, mm, between the paths of neighbouring scanlines at the origin; its sign is the
+                           // handedness: e_e = sign(strip) * cross(d, e_l)
 };
 
 // The state of a main path on arrival at a surface, before any random choice.
@@ -229,5 +241,6 @@ struct Counters {
     uint false_unions;                 // F1: those at which the ray misses the bounds of what is shown
     uint false_boxes;                  // F2: those at which it meets the bounds, but no triangle
     uint taken_even; uint taken_odd;   // pieces of work that the workers of trace have taken, in even and odd dispatches
-    uint unused0; uint unused1; uint unused2;
+    uint strips_limited;               // segments whose strips are wider or narrower than STRIP_LIMIT allows
+    uint unused0; uint unused1;
 };

@@ -20,6 +20,7 @@ void start(uint line, uint n, out Path path, inout Media media) {
     if (travelled > 0.0) {
         path.origin += travelled * path.direction;
         path.time = travelled / frame.speed;
+        path.strip.x += travelled * path.strip.y;
         path.t_min = clearance(path.origin);
     }
     path.weight = uintBitsToFloat(stacks[at + MAX_STACK + 2u]);

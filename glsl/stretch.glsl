@@ -3,7 +3,7 @@
 // The includer declares frame, tissues[], rows[] and segments[], and includes transform.glsl and probe.glsl.
 
 const float LOG2_E = 1.44269504;
-const float INVERSE_FALL = 1.38629436;    // 2 ln 2: times `shape.x` or `shape.y` it is 1 / sigma^2
+const float INVERSE_FALL = 1.38629436;    // 2 ln 2: times `shape.y` it is 1 / sigma^2 in elevation
 const float SLOT_MARGIN = 0.5 / float(SCATTER_SLOT);
 
 // A segment in the frame of its scatterers.
@@ -12,6 +12,8 @@ struct Stretch {
     float extent; float time; float weight;
     vec3 spread; float share;
     vec3 lens;
+    vec2 strip;          // distance to the neighbouring scanline's path, mm, and its growth per mm
+    vec2 pitch;          // distance to the neighbouring scanline, likewise
     bool reflected;      // on its way to its start
     float speed; float absorption;
     vec2 off;            // distance from the geometric scanline, mm: at the start and per mm
@@ -31,18 +33,22 @@ Stretch world_stretch(uint at) {
     s.time = b.w;
     s.e_l = c.xyz;
     s.weight = c.w;
-    s.e_e = segments[at].handedness * cross(s.d, s.e_l);
+    float strip = segments[at].strip;
+    s.e_e = cross(s.d, s.e_l) * (strip < 0.0 ? -1.0 : 1.0);
     s.spread = w.xyz;
     s.share = w.w;
     s.lens = segments[at].lens.xyz;
-    s.reflected = segments[at].lens.w > 0.5;
+    s.strip = vec2(abs(strip), segments[at].lens.w);
     s.tissue = segments[at].tissue;
     s.instance = segments[at].instance;
     s.speed = tissues[s.tissue].speed;
     s.absorption = tissues[s.tissue].absorption;
-    uint line = segments[at].line;
+    s.reflected = (segments[at].line & REFLECTED) != 0u;
+    uint line = segments[at].line & ~REFLECTED;
     s.layer_y = elevation(line / frame.scanlines);
     s.off = vec2(0.0);
+    vec2 pitch = line_pitch();
+    s.pitch = vec2(pitch.x + pitch.y * frame.speed * s.time, pitch.y * frame.speed / s.speed);
     if (frame.beam_width > 0.0) {
         vec3 o, d, lateral;
         probe_ray(line % frame.scanlines, line / frame.scanlines, o, d, lateral);
@@ -64,18 +70,19 @@ bool is_finite(Stretch s) {
     return abs(s.extent) < 1e18 && abs(s.time) < 1e18 && abs(s.weight) < 1e18 && abs(s.share) < 1e18
         && all(lessThan(abs(s.o), vec3(1e18))) && all(lessThan(abs(s.d), vec3(2.0)))
         && all(lessThan(abs(s.e_l), vec3(2.0))) && all(lessThan(abs(s.spread), vec3(1e18)))
-        && all(lessThan(abs(s.lens), vec3(1e18)));
+        && all(lessThan(abs(s.lens), vec3(1e18))) && all(lessThan(abs(s.strip), vec2(1e18)));
 }
 
 bool sounds(Stretch s) { return tissues[s.tissue].presence > 0.0 && s.weight > 0.0 && is_finite(s); }
 
 // The factor on amplitudes: echoes that a rough reflection spreads over many resolution cells average out; a path off the
-// geometric scanline is received more weakly. `shape` is that of the row.
-float thinning(Stretch s, float x, vec4 shape) {
+// geometric scanline is received more weakly. `row` is that of the distance.
+float thinning(Stretch s, float x, uint row) {
     float variance = s.spread.x + x * (2.0 * s.spread.y + x * s.spread.z);
     float beam = beam_weight(s.off.x + x * s.off.y);
     if (variance <= 0.0) return beam;
-    vec2 widened = 1.0 + variance * INVERSE_FALL * shape.xy;
+    vec2 sigmas = vec2(rows[row].sigma_lateral, rows[row].sigma_elevation);
+    vec2 widened = 1.0 + variance / (sigmas * sigmas);
     float cells = sqrt(widened.x * widened.y);
     return beam * min(1.0, sqrt(s.share / cells));
 }
@@ -87,22 +94,41 @@ vec3 offset_at(Stretch s, vec3 x) { return s.lens.x + x * (s.lens.y + x * s.lens
 // wider by the offset, the product of both by half its square.
 float widened(float off, float fall) { return 1.0 + min(0.5 * off * off * fall, MOST_WIDENED); }
 
-// 1 / sigma^2 across over that of an even wavefront at distance x, `fall` as above.
-float narrowing(Stretch s, float x, float fall) { return 1.0 / widened(offset_at(s, vec3(x)).x, fall); }
+// 1 / sigma^2 across over that of an even wavefront at distance x, whose standard deviation is that of the row.
+float narrowing(Stretch s, float x, uint row) {
+    float sigma = rows[row].sigma_lateral;
+    return 1.0 / widened(offset_at(s, vec3(x)).x, 1.0 / (sigma * sigma));
+}
 
-// The beam's shape at a row: as it is behind even surfaces, wider and as much fainter behind those that bend the wavefront.
-// Of what is wider, fewer scatterers are enough.
+// Distance of the neighbouring scanlines' paths at distance x over that of the scanlines, with its limits.
+float strip_ratio(Stretch s, float x) {
+    float nominal = max(s.pitch.x + x * s.pitch.y, LEAST_PITCH);
+    return clamp(abs(s.strip.x + x * s.strip.y) / nominal, 1.0 / STRIP_LIMIT, STRIP_LIMIT);
+}
+
+// How the stretch hears scatterers at a row, as the row's `shape` says of a path among even surfaces. Behind a surface that
+// bends the wavefront, fewer of the beam's parts arrive together: a scatterer is fainter by as much as it would be wider.
 vec4 shape_at(Stretch s, uint row) {
     vec4 shape = rows[row].shape;
-    float narrow = narrowing(s, distance_at(s, float(row) + 0.5), INVERSE_FALL * shape.x);
-    float fainter = 0.5 * log2(narrow);
-    return vec4(shape.x * narrow, shape.y, shape.z + fainter, mix(shape.w - fainter, shape.w, shape.w <= ALL_LEVELS));
+    if (all(equal(s.lens, vec3(0.0)))) return shape;
+    float narrow = narrowing(s, distance_at(s, float(row) + 0.5), row);
+    return vec4(shape.xy, shape.z + 0.25 * log2(narrow), shape.w);
+}
+
+// The part of a scatterer's amplitude that a scanline hears `across` mm beside its path, in a strip `wide` to either side, of
+// which the share `core` is heard whole: those of all scanlines add up to the same number everywhere. Below 0 it is that of a
+// beam narrower than what lines could share. Where neighbouring paths leave a strip `ratio` times as wide it has more scatterers, and hears each more weakly.
+float strip_share(float across, float wide, float core, float ratio) {
+    float off = abs(across) / (wide * ratio);
+    if (!(off < 1.0)) return 0.0;
+    float share = core < 0.0 ? exp2(-0.5 * LOG2_E * STRIP_CUT * STRIP_CUT * off * off) : min((1.0 - off) / (1.0 - core), 1.0);
+    return share * inversesqrt(ratio);
 }
 
 // Level of its speckle at distance x: one-way weight times echogenicity, log2.
 float level_at(Stretch s, float x) {
     uint row = row_at(kappa_at(s, x));
-    float weight = s.weight * thinning(s, x, rows[row].shape);
+    float weight = s.weight * thinning(s, x, row);
     return log2(weight) - s.absorption * LOG2_E * x + tissues[s.tissue].level;
 }
 

@@ -119,6 +119,23 @@ bool transmit_path(inout Path path, vec3 n, vec3 n_geometric, float c1, float c2
     return true;
 }
 
+// The neighbouring scanline's path behind a surface of normal n, which turns by `turning` per mm across: it meets the
+// surface's plane beside this path, and is refracted there. Takes its distance across in front of the surface, mm, with
+// the growth per mm; returns the same behind it, where the path's lateral axis is `beside`. At total reflection, which
+// only a part of the beam passes, both go on as they came.
+vec2 strip_behind(vec2 strip, vec3 direction, vec3 lateral, vec3 beside, vec3 n, vec3 turning, float c1, float c2) {
+    float facing = max(-dot(direction, n), LEAST_FACING);
+    // From where this path meets the plane to where the neighbouring one does, for 1 mm between them.
+    vec3 shift = lateral + dot(lateral, n) / facing * direction;
+    float across = dot(shift, beside);
+    // So near to it that both go through, so far that rounding does not matter.
+    float part = min(BENDING_STEP / max(abs(strip.x), LEAST_PITCH), BENDING_ANGLE / max(abs(strip.y), LEAST_PITCH));
+    vec3 middle, aside;
+    bool through = dot(direction, n) < 0.0 && refraction(direction, n, c1, c2, middle)
+        && refraction(normalize(direction + part * strip.y * lateral), normalize(n + part * strip.x * turning), c1, c2, aside);
+    return vec2(strip.x * across, mix(strip.y, dot(aside - middle, beside) / part, through));
+}
+
 // Curvature that a surface of normal n, which turns by `turning` per mm across, gives to the wavefront of a path: change
 // of the refracted direction per mm across, rad.
 float bending(vec3 direction, vec3 lateral, vec3 n, vec3 turning, float c1, float c2) {

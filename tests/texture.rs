@@ -14,7 +14,7 @@ use insonify::scene::animation::{Clock, Motion, Turn};
 use insonify::scene::graph::{Node, NodeKind};
 use insonify::scene::{Instance, Keyframes, Mesh, Scene, Surface, Tissue, shapes};
 use insonify::settings::{ScatterMode, TextureSpace};
-use insonify::sim::calibration::{Calibration, LATERAL_CUT};
+use insonify::sim::calibration::Calibration;
 use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer, fields::Fields};
 use insonify_tools::reference::field::Field;
@@ -280,14 +280,14 @@ fn heard(scene: &Scene) -> f64 {
     f64::from(simulator.counters().expect("counters").deposits)
 }
 
-/// Number of scatterers in the beams between two depths: their cross-section is the lateral cut's; the number of
+/// Number of scatterers in the strips of all lines between two depths; the number of
 /// lattice cells per scatterer follows from the tissue's speckle by amplitudes of one modulus.
 fn in_the_beams(scene: &Scene, [from, to]: [f64; 2]) -> f64 {
     const STEPS: u32 = 1000;
     let calibration = Calibration::new(scene);
     let step = (to - from) / f64::from(STEPS);
     let depths = (0..STEPS).map(|i| from + (f64::from(i) + 0.5) * step);
-    let widths = depths.map(|z| 2.0 * LATERAL_CUT * calibration.sigma_lateral(z));
+    let widths = depths.map(|z| 2.0 * calibration.strip(z).half * calibration.pitch(z));
     let area = widths.sum::<f64>() * step;
     let height = 2.0 * calibration.elevation_reach();
     let cells = f64::from(scene.probe.scanlines) * area * height / scene.simulation.cell.powi(3);

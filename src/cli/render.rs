@@ -150,7 +150,7 @@ pub fn run(args: &Render) -> Result<()> {
             "counters": {
                 "rays": counters.rays, "interactions": counters.interactions, "segments": counters.segments,
                 "candidates": counters.candidates, "deposits": counters.deposits,
-                "segments_dropped": counters.segments_dropped, "stack_overflow": counters.stack_overflow,
+                "segments_dropped": counters.segments_dropped, "strips_limited": counters.strips_limited, "stack_overflow": counters.stack_overflow,
                 "paths_lost": counters.paths_lost,
             },
             "scatterers_per_resolution_cell": scatterers(&scene),

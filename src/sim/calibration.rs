@@ -3,8 +3,10 @@
 //! Everything is relative to a perfect flat mirror, which deposits 1 and shows envelope 1.
 
 mod headroom;
+mod strip;
 mod work;
 
+pub use strip::Strip;
 pub use work::Work;
 
 use std::f64::consts::{LN_10, PI, TAU};
@@ -20,8 +22,9 @@ const LIVER_LEVEL: f64 = -45.0;
 /// Largest compensation of surface echoes at deposit, dB. They are up to 45 dB above speckle, so
 /// that they need less to stay above the rounding, and more would cost headroom.
 const SURFACE_COMPENSATION_LIMIT: f64 = 42.0;
-/// Half-width of the beam within which scatterers count, in sigmas (amplitude .044 at the edge).
-pub const LATERAL_CUT: f64 = 2.5;
+/// Distance of a layer from the image plane from which on its scatterers do not count, in sigmas of the beam in elevation
+/// (amplitude .044 there).
+pub const ELEVATION_CUT: f64 = 2.5;
 /// Largest brightening of layers that sample only a part of the beam, as a power: 30 dB. Beyond,
 /// the layers miss the beam altogether and darkness is the honest picture.
 const ELEVATION_GAIN_LIMIT: f64 = 1000.0;
@@ -164,18 +167,18 @@ impl<'a> Calibration<'a> {
         (kept(&layers, layer_pitch) * kept(&lines, probe.line_pitch(z))).sqrt().recip()
     }
 
-    /// The part of the energy of the whole two-way beam, pi sigma_x sigma_e, that each layer receives at depth `z`: its
-    /// slab, to the edge of an ellipse of [`LATERAL_CUT`] sigmas.
+    /// The part of the energy of the two-way beam in elevation, sqrt(pi) sigma_e, that each layer receives at depth `z`: its
+    /// slab, if some of it lies within [`ELEVATION_CUT`] sigmas.
     fn heard(&self, z: f64) -> impl Iterator<Item = f64> + '_ {
         let (sigma, reach) = (self.sigma_elevation(z), self.elevation_reach());
         self.elevations().map(move |y| {
-            let nearest = (y.abs() - reach).max(0.0) / (LATERAL_CUT * sigma);
-            let width = LATERAL_CUT * (1.0 - nearest * nearest).max(0.0).sqrt();
-            erf(width) * (erf((y + reach) / sigma) - erf((y - reach) / sigma)) / 2.0
+            let heard = y.abs() - reach < ELEVATION_CUT * sigma;
+            let part = (erf((y + reach) / sigma) - erf((y - reach) / sigma)) / 2.0;
+            if heard { part } else { 0.0 }
         })
     }
 
-    /// Energy of the whole two-way beam across and in elevation, divided by the part that the layers receive.
+    /// Energy of the two-way beam in elevation, divided by the part that the layers receive.
     pub fn beam_power(&self, z: f64) -> f64 {
         (1.0 / self.heard(z).sum::<f64>().max(1e-12)).min(ELEVATION_GAIN_LIMIT)
     }
@@ -288,8 +291,8 @@ impl<'a> Calibration<'a> {
 
     /// The factor on a scatterer's calibrated amplitude at depth `z`, before attenuation compensation.
     ///
-    /// Lattice: E|IQ|^2 = C^2 v h^-3 (int u^2 dz) pi sigma_x sigma_e over [`Self::beam_power`], v the power
-    /// of a cell; v = 1 is liver.
+    /// Lattice: E|IQ|^2 = C^2 v h^-3 (int u^2 dz) (int K^2 dx) sqrt(pi) sigma_e over [`Self::beam_power`], v the power
+    /// of a cell; v = 1 is liver; K is what a line hears across ([`Strip`]).
     /// Voxel: E|IQ|^2 = C^2 v S_lateral S_axial sum_e w_e^2; lookups in one voxel are equal, so
     /// both sums run over pairs, weighted with the probability 1 - distance/h that a lattice
     /// along the beam puts both into one voxel.
@@ -298,9 +301,9 @@ impl<'a> Calibration<'a> {
         let (h, dz) = (simulation.cell, self.scene.probe.sample_pitch());
         let energy = match simulation.scatter_mode {
             ScatterMode::Lattice => {
-                let beam = self.sigma_lateral(z) * self.sigma_elevation(z);
-                let slice = PI * beam / self.beam_power(z);
-                h.powi(-3) * self.axial_energy(0) * dz * slice
+                let across = self.strip(z).energy() * self.pitch(z);
+                let up = PI.sqrt() * self.sigma_elevation(z) / self.beam_power(z);
+                h.powi(-3) * self.axial_energy(0) * dz * across * up
             }
             ScatterMode::Voxel => {
                 let same = |distance: f64| (1.0 - distance / h).max(0.0);

@@ -53,6 +53,7 @@ impl Passes {
                 ("frame", "direct_frame"),
                 ("surface_echoes", echoes),
                 ("volume_echoes", "no_echoes"),
+                ("point_echoes", "no_echoes"),
                 ("counters", "direct_counters"),
                 ("lateral", "label_lateral"),
                 ("iq", iq),

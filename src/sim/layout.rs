@@ -139,8 +139,18 @@ constants! {
     pub const LEAST_DESCENT: f32 = 1e-3;
     /// Distance from the axis at which the bending of a wavefront is found, mm.
     pub const BENDING_STEP: f32 = 0.1;
+    /// Largest angle to a path beside the axis by which the growth of its distance is found, rad.
+    pub const BENDING_ANGLE: f32 = 0.05;
     /// Growth of a beam's variance across behind a lens, over its own, that is not exceeded.
     pub const MOST_WIDENED: f32 = 8.0;
+    /// Factor by which a scanline's strip of scatterers is at most wider or narrower than nominal.
+    pub const STRIP_LIMIT: f32 = 4.0;
+    /// Deviations of a narrow beam at which its strip ends.
+    pub const STRIP_CUT: f32 = 2.5;
+    /// Smallest distance between scanlines, mm, where all of them meet.
+    pub const LEAST_PITCH: f32 = 1e-6;
+    /// Bit of a segment's line: it was reflected on its way.
+    pub const REFLECTED: u32 = 1 << 31;
 
     /// Smallest power whose level is told of a sample; that of a perfect mirror is 1.
     pub const LEAST_POWER: f32 = 1e-30;
@@ -181,7 +191,7 @@ shared! {
         slice_thickness: f32, speed: f32, sample_pitch: f32, frequency: f32,
         paths: u32, sampling: u32, max_interactions: u32, max_reflections: u32,
         min_weight: f32, volume_floor: f32, flags: u32, seed: u32,
-        origin_jitter: f32, cell: f32, elevation_reach: f32, lateral_cut: f32,
+        origin_jitter: f32, cell: f32, elevation_reach: f32, elevation_cut: f32,
         surface_scale: f32, volume_scale: f32, segment_capacity: u32, background: u32,
         instances: u32, points: u32, face_height: f32, axial_sigma: f32,
         noise: f32, inverse_reference: f32, inverse_range: f32, frame_index: u32,
@@ -219,7 +229,8 @@ shared! {
         volume_gain: f32, point_gain: f32, surface_gain: f32,
         volume_undo: f32, surface_undo: f32, lateral_lines: f32,
         tgc: f32, compensation: f32, incoherent_gain: f32, receive_reach: f32,
-        black: f32, sigma_wavefront: f32, aperture: f32, unused: f32,
+        black: f32, sigma_wavefront: f32, aperture: f32, strip_lines: f32,
+        strip_core: f32, unused0: f32, unused1: f32, unused2: f32,
     }
     /// A straight part of a path inside one medium.
     struct Segment {
@@ -228,7 +239,7 @@ shared! {
         lateral_weight: [f32; 4],
         spread: [f32; 4],
         lens: [f32; 4],
-        tissue: u32, instance: u32, line: u32, handedness: f32,
+        tissue: u32, instance: u32, line: u32, strip: f32,
     }
     /// The state of a main path on arrival at a surface, before any random choice.
     struct Interaction {
@@ -269,7 +280,7 @@ shared! {
         rays: u32, interactions: u32, segments: u32, candidates: u32,
         deposits: u32, node_visits: u32, triangle_tests: u32, top_visits: u32,
         instances_reached: u32, false_unions: u32, false_boxes: u32, taken_even: u32,
-        taken_odd: u32, unused0: u32, unused1: u32, unused2: u32,
+        taken_odd: u32, strips_limited: u32, unused0: u32, unused1: u32,
     }
 }
 

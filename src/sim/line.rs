@@ -38,7 +38,8 @@ impl OneLine {
 
 /// Scanlines on each side over which `beam` smooths, at most, with these tables.
 fn reach(tables: &Tables) -> u32 {
-    let widest = tables.rows.iter().map(|row| row.lateral_lines).fold(0.0, f32::max);
+    let lines = tables.rows.iter().flat_map(|row| [row.lateral_lines, row.strip_lines]);
+    let widest = lines.fold(0.0, f32::max);
     ((3.0 * widest).ceil() as u32).min(LATERAL_REACH as u32)
 }
 

@@ -13,13 +13,20 @@ impl Simulator {
         Ok(bytemuck::pod_read_unaligned(&self.read("counters")?))
     }
 
-    /// The integer accumulators of the last frame, surface then volume echoes: complex pairs, [L][K].
+    /// The integer accumulators of the last frame, surface then volume echoes: complex pairs, [L][K]. Scatterers are those
+    /// that each line hears itself; point targets are added to them.
     ///
     /// # Errors
     /// A Vulkan error.
     pub fn echoes(&mut self) -> Result<[Vec<i32>; 2], SimError> {
         let both = [self.read("surface_echoes")?, self.read("volume_echoes")?];
-        Ok(both.map(|bytes| bytemuck::pod_collect_to_vec(&bytes)))
+        let [surface, mut volume]: [Vec<i32>; 2] =
+            both.map(|bytes| bytemuck::pod_collect_to_vec(&bytes));
+        if self.constants().points > 0 {
+            let points: Vec<i32> = bytemuck::pod_collect_to_vec(&self.read("point_echoes")?);
+            volume.iter_mut().zip(points).for_each(|(sum, point)| *sum = sum.saturating_add(point));
+        }
+        Ok([surface, volume])
     }
 
     /// Segments of the last frame per line e * scanlines + l, in no particular order; where the paths

@@ -1,6 +1,6 @@
 //! Tables for the kernels: a scene as the structures of [`layout`](super::layout), computed in f64.
 
-use super::calibration::{Calibration, LATERAL_CUT, amplitude};
+use super::calibration::{Calibration, ELEVATION_CUT, amplitude};
 use super::contact::reach;
 use super::layout;
 use super::placement::matrix_rows;
@@ -97,7 +97,7 @@ fn constants(
         ray_mask: 0xff,
         cell: simulation.cell as f32,
         elevation_reach: calibration.elevation_reach() as f32,
-        lateral_cut: LATERAL_CUT as f32,
+        elevation_cut: ELEVATION_CUT as f32,
         surface_scale: surface_scale as f32,
         volume_scale: volume_scale as f32,
         background: scene.background as u32,
@@ -194,11 +194,11 @@ pub fn scanlines(probe: &Probe) -> Vec<layout::Scanline> {
     .collect()
 }
 
-/// `shape` of a row, for a beam with these standard deviations laterally and in elevation, mm, and this gain:
-/// the log2 of its decrease per mm^2 in both directions, the log2 of the gain, and the lattice level.
-pub fn beam_shape(sigmas: [f64; 2], gain: f64, level: f64) -> [f32; 4] {
-    let [across, up] = sigmas.map(|s| 0.5 * std::f64::consts::LOG2_E / (s * s));
-    [across, up, gain.log2(), level].map(|v| v as f32)
+/// `shape` of a row, for a strip of scatterers of this half width, mm, a beam of this standard deviation in elevation, mm,
+/// and this gain: the half width, the log2 of the decrease per mm^2 in elevation, the log2 of the gain, the lattice level.
+pub fn beam_shape(half_width: f64, elevation: f64, gain: f64, level: f64) -> [f32; 4] {
+    let up = 0.5 * std::f64::consts::LOG2_E / (elevation * elevation);
+    [half_width, up, gain.log2(), level].map(|v| v as f32)
 }
 
 /// One row per axial sample.
@@ -216,8 +216,10 @@ pub fn rows(scene: &Scene) -> Vec<layout::Row> {
                 [calibration.sigma_lateral(z), calibration.sigma_elevation(z)];
             let gain = calibration.speckle_gain(z) * compensation;
             let level = calibration.lattice_level(z).max(f64::from(layout::ALL_LEVELS));
+            let strip = calibration.strip(z);
+            let half_width = strip.half * calibration.pitch(z);
             layout::Row {
-                shape: beam_shape([lateral, elevation], gain, level),
+                shape: beam_shape(half_width, elevation, gain, level),
                 sigma_lateral: lateral as f32,
                 sigma_elevation: elevation as f32,
                 volume_gain: gain as f32,
@@ -233,6 +235,8 @@ pub fn rows(scene: &Scene) -> Vec<layout::Row> {
                 black: calibration.black(z).max(f64::from(layout::ALL_LEVELS)) as f32,
                 sigma_wavefront: scene.probe.sigma_wavefront(z) as f32,
                 aperture: scene.probe.wavefront_aperture(z) as f32,
+                strip_lines: strip.smoothing as f32,
+                strip_core: strip.core as f32,
                 ..layout::Row::default()
             }
         })

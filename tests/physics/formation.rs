@@ -2,6 +2,7 @@
 
 use insonify::probe::Probe;
 use insonify::scene::Scene;
+use insonify::sim::calibration::lateral_taps;
 use insonify::sim::{layout, tables};
 
 use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};
@@ -159,8 +160,12 @@ fn decaying(scene: &Scene, frame: &layout::Frame, rows: &[layout::Row]) -> Vec<i
         .flat_map(|i| {
             let row = &rows[i % samples];
             let z = (i % samples) as f64 * scene.probe.sample_pitch();
-            // Two-way amplitude is the one-way intensity weight exp(-absorption z).
+            // What a line hears itself, of which smoothing over lines makes as much as there is; the two-way amplitude is
+            // the one-way intensity weight exp(-absorption z).
+            let taps = lateral_taps(f64::from(row.strip_lines));
+            let own = (1.0 + 2.0 * taps[1..].iter().map(|w| w * w).sum::<f64>()).sqrt().recip();
             let echo = 3e-3
+                * own
                 * (-attenuation * z).exp()
                 * f64::from(row.compensation)
                 * f64::from(frame.volume_scale);

@@ -96,13 +96,14 @@ pub fn twin(scene: &Scene) -> Frame {
     let traced = inputs.traced();
     let segments: Vec<Segment> = traced.segments.concat();
     let volume = scatter::scatter(&world, &segments);
+    let points = scatter::points(&world, &segments);
     let single = |v: Vec<f64>| v.iter().map(|&x| x as f32).collect::<Vec<f32>>();
     let (frame, rows) = (&inputs.frame, &inputs.rows);
     let coupling = Coupling::of(scene, &mut Skins::default());
     let lateral = single(beam::beam(
         frame,
         rows,
-        [&narrow(&traced.surface), &narrow(&volume)],
+        [&narrow(&traced.surface), &narrow(&volume), &narrow(&points)],
         &contact::table(scene, coupling.as_ref()),
     ));
     let iq = axial::axial(frame, &lateral);

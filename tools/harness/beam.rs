@@ -3,7 +3,7 @@
 use super::inputs::{Random, frame, rows, samples};
 use super::{Case, Check, Input, Job, Size, Subject};
 use crate::reference::beam;
-use insonify::sim::layout::{Counters, FLAG_VOXEL, Frame, Row};
+use insonify::sim::layout::{Counters, Frame, Row};
 use insonify::sim::stages;
 
 /// Largest magnitude of the random accumulators.
@@ -39,16 +39,15 @@ pub(super) fn contact(frame: &Frame, random: &mut Random) -> Vec<f32> {
 fn job(case: Case, size: Size) -> Job {
     let mut frame = frame(case, size);
     let mut rows = rows(&frame);
-    // The odd case is in voxel mode, where scatterers are smoothed too.
-    if case == Case::Odd {
-        frame.flags |= FLAG_VOXEL;
-    }
     frame.noise = NOISE;
+    // Most cases have point targets.
+    frame.points = u32::from(case != Case::Odd);
     let mut random = Random(1);
     let mut echoes = || -> Vec<i32> {
         (0..2 * samples(&frame)).map(|_| random.within(-ECHO, ECHO) as i32).collect()
     };
     let (mut surface, volume) = (echoes(), echoes());
+    let points = if frame.points > 0 { echoes() } else { vec![0; 2] };
     let contact = contact(&frame, &mut random);
     if case == Case::NotFinite {
         rows[3].surface_undo = f32::NAN;
@@ -62,6 +61,7 @@ fn job(case: Case, size: Size) -> Job {
         Input::integers("surface_echoes", &surface),
         Input::integers("volume_echoes", &volume),
         Input::floats("contact", &contact),
+        Input::integers("point_echoes", &points),
     ];
     Job::of(&stages::BEAM, given, Vec::new())
 }
@@ -69,14 +69,18 @@ fn job(case: Case, size: Size) -> Job {
 fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     let frame: Frame = job.one("frame");
     let rows: Vec<Row> = job.get("rows");
-    let (surface, volume): (Vec<i32>, Vec<i32>) =
-        (job.get("surface_echoes"), job.get("volume_echoes"));
+    let accumulators: [Vec<i32>; 3] =
+        ["surface_echoes", "volume_echoes", "point_echoes"].map(|name| job.get(name));
+    let accumulators = accumulators.each_ref().map(Vec::as_slice);
+    let [surface, volume, points] = accumulators;
+    // Without points there is no room for their echoes.
+    let points = if frame.points > 0 { points } else { &[] };
     let contact: Vec<f32> = job.get("contact");
-    let expected = beam::beam(&frame, &rows, [&surface, &volume], &contact);
+    let expected = beam::beam(&frame, &rows, [surface, volume, points], &contact);
     let got: Vec<f32> = job.after(outputs, "lateral");
     let counters: Vec<Counters> = job.after(outputs, "counters");
     let largest = |v: &[i32]| f64::from(v.iter().map(|x| x.unsigned_abs()).max().unwrap_or(0));
-    let (s, v) = (largest(&surface), largest(&volume));
+    let (s, v) = (largest(surface), largest(volume) + largest(points));
     let allowed = |i: usize| {
         let row = &rows[i / 2 % frame.samples as usize];
         let undone = s * f64::from(row.surface_undo) + 3.0 * v * f64::from(row.volume_undo);
@@ -84,6 +88,10 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     };
     vec![
         Check::close("lateral", &got, &expected, allowed),
-        Check::equal("saturated", &[counters[0].saturated], &[beam::saturated(&surface, &volume)]),
+        Check::equal(
+            "saturated",
+            &[counters[0].saturated],
+            &[beam::saturated([surface, volume, points])],
+        ),
     ]
 }

@@ -99,7 +99,7 @@ pub fn frame(case: Case, size: Size) -> Frame {
         beam_width: 4.0,
         cell: 0.3,
         elevation_reach: 0.9,
-        lateral_cut: 2.5,
+        elevation_cut: 2.5,
         surface_scale: 65536.0,
         volume_scale: 65536.0,
         segment_capacity: 256,
@@ -128,7 +128,12 @@ pub fn rows(frame: &Frame) -> Vec<Row> {
             let gain = 1.0 + 0.01 * depth;
             let level = 0.5 + 0.05 * depth;
             Row {
-                shape: tables::beam_shape(sigmas.map(f64::from), gain.into(), level.into()),
+                shape: tables::beam_shape(
+                    0.3 + 0.01 * f64::from(depth),
+                    sigmas[1].into(),
+                    gain.into(),
+                    level.into(),
+                ),
                 sigma_lateral: sigmas[0],
                 sigma_elevation: sigmas[1],
                 volume_gain: gain,
@@ -144,6 +149,9 @@ pub fn rows(frame: &Frame) -> Vec<Row> {
                 black: -12.0 + 0.02 * depth,
                 sigma_wavefront: 5.0 - 0.06 * depth,
                 aperture: 0.1 - 0.0005 * depth,
+                strip_lines: 0.02 + 0.05 * depth,
+                // Narrow beams at every eighth sample.
+                strip_core: if k % 8 == 5 { -1.0 } else { 0.8 - 0.01 * depth },
                 ..Row::default()
             }
         })

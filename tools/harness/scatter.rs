@@ -146,15 +146,20 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     let segments: Vec<layout::Segment> = job.get("segments");
     let counts: Vec<u32> = job.get("segment_count");
     let held = held(&segments, &counts, frame);
-    let twin = scatter::scatter(&world, &held);
-    let echoes: Vec<i32> = job.after(outputs, "volume_echoes");
-    let echoes: Vec<f64> = echoes.into_iter().map(f64::from).collect();
+    let (twin, points) = (scatter::scatter(&world, &held), scatter::points(&world, &held));
+    let [echoes, point_echoes] = ["volume_echoes", "point_echoes"].map(|name| {
+        let echoes: Vec<i32> = job.after(outputs, name);
+        echoes.into_iter().map(f64::from).collect::<Vec<f64>>()
+    });
     // A cell whose middle lies within 8e-6 mm of either end of the layer's slab may count or not: that share
     // of the scatterers, and of their power.
     let at_an_end = 4.0 * 8e-6 / (2.0 * f64::from(frame.elevation_reach));
     let allowed =
         if frame.flags & FLAG_VOXEL == 0 { (2e-3_f64.powi(2) + at_an_end).sqrt() } else { 3e-2 };
-    let fixed: Vec<f64> = twin.fixed.iter().map(|&x| x as f64).collect();
+    let [fixed, point_fixed] =
+        [&twin, &points].map(|twin| twin.fixed.iter().map(|&x| x as f64).collect::<Vec<f64>>());
+    // Without points there is no room for their echoes.
+    let point_fixed = if frame.points > 0 { &point_fixed[..] } else { &[] };
     let counters: Counters = job.after(outputs, "counters")[0];
     let beyond = |echoes: &[f64]| {
         let lines = echoes.chunks(2 * frame.samples.max(1) as usize);
@@ -162,13 +167,20 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
         late.copied().collect::<Vec<f64>>()
     };
     let [late, late_fixed] = [&echoes, &fixed].map(|echoes| beyond(echoes));
-    let heard = late_fixed.is_empty() || late_fixed.iter().any(|&echo| echo != 0.0);
+    let late_points = beyond(point_fixed);
+    let heard = late_fixed.is_empty() || late_fixed.iter().chain(&late_points).any(|&e| e != 0.0);
+    let saturated = twin.saturated + points.saturated;
     let echoed = twin.deposits.iter().any(|&n| n > 0) as u32;
     vec![
         Check::one("echo norm", relative_norm(&echoes, &fixed), allowed),
         Check::one("beyond a window, norm", relative_norm(&late, &late_fixed), allowed),
         Check::equal("anything beyond it", &[heard], &[true]),
-        Check::equal("saturated", &[counters.saturated], &[twin.saturated]),
+        Check::one(
+            "points, norm",
+            relative_norm(&point_echoes[..point_fixed.len()], point_fixed),
+            2e-3,
+        ),
+        Check::equal("saturated", &[counters.saturated], &[saturated]),
         Check::equal("echoes at all", &[u32::from(echoes.iter().any(|&e| e != 0.0))], &[echoed]),
     ]
 }

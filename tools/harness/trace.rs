@@ -141,7 +141,9 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     let spare = 4 * (paths / 400);
     let interactions = counters.interactions.abs_diff(twin.counters.interactions) as usize;
     let kept = |c: &Counters| [c.paths_lost, c.stack_overflow, c.segments_dropped];
+    let limited = counters.strips_limited.abs_diff(twin.counters.strips_limited) as usize;
     vec![
+        Check::count("strips limited", total, limited, spare),
         Check::count("segments", total, missing, spare),
         Check::one("echo norm", relative_norm(&echoes, &fixed), 2e-3),
         Check::count("interactions", paths, interactions, spare),
@@ -165,6 +167,9 @@ fn unmatched(mut got: Vec<Segment>, expected: &[Segment]) -> usize {
 /// 100 mm, its change per mm, and half of the change of that.
 const LENS: [f64; 3] = [1e-2, 2e-4, 1e-6];
 
+/// Absolute error of a strip, mm and mm per mm, for the same reason.
+const STRIP: [f64; 2] = [1e-3, 2e-5];
+
 fn alike(a: &Segment, b: &Segment) -> bool {
     let close = |a: f64, b: f64, by: f64| (a - b).abs() <= by || (a.is_nan() && b.is_nan());
     let relative = |a: f64, b: f64| close(a, b, 1e-3 * b.abs());
@@ -178,6 +183,7 @@ fn alike(a: &Segment, b: &Segment) -> bool {
         && relative(a.weight, b.weight)
         && relative(a.share, b.share)
         && (0..3).all(|i| close(a.spread[i], b.spread[i], 1e-3 * b.spread[i].abs() + 1e-6))
-        && a.reflections == b.reflections
+        && a.reflected == b.reflected
+        && (0..2).all(|i| close(a.strip[i], b.strip[i], 5e-3 * b.strip[i].abs() + STRIP[i]))
         && (0..3).all(|i| close(a.lens[i], b.lens[i], 5e-3 * b.lens[i].abs() + LENS[i]))
 }

@@ -1,20 +1,20 @@
-//! Twin of `beam`: both accumulators as amplitudes, smoothed laterally, weakened where the probe has
+//! Twin of `beam`: accumulators as amplitudes, of surfaces and scatterers smoothed laterally, weakened where the probe has
 //! lost contact, with electronic noise.
 
 use super::random::{gaussian, pcg4d};
-use insonify::sim::layout::{FLAG_VOXEL, Frame, KIND_PHASED, Row};
+use insonify::sim::layout::{Frame, KIND_PHASED, Row};
 
 /// Width, in scanlines, below which a lateral kernel does not smooth.
 const NARROWEST: f64 = 0.05;
 
 /// Complex baseband lines: index 2 (l K + k) + {0: real, 1: imaginary}.
 ///
-/// `contact` has the coupled share of each line's transmit aperture, then the sums, from 0 on, of what is
+/// `points` may be empty where there are none. `contact` has the coupled share of each line's transmit aperture, then the sums, from 0 on, of what is
 /// not coupled of the elements before each.
 pub fn beam(
     frame: &Frame,
     rows: &[Row],
-    [surface, volume]: [&[i32]; 2],
+    [surface, volume, points]: [&[i32]; 3],
     contact: &[f32],
 ) -> Vec<f64> {
     let mut out = Vec::with_capacity(surface.len());
@@ -22,8 +22,8 @@ pub fn beam(
         for k in 0..frame.samples {
             let row = &rows[k as usize];
             let words = pcg4d([frame.first_line + l, k, frame.frame_index, frame.seed]);
-            let weights = weights(row.lateral_lines.into());
-            let reach = weights.len() as i64 / 2;
+            let of_surfaces = weights(row.lateral_lines.into());
+            let of_scatterers = weights(row.strip_lines.into());
             let coupling = coupling(frame, row, contact, l);
             for part in 0..2 {
                 let at = |j: i64| {
@@ -33,23 +33,25 @@ pub fn beam(
                     inside.then(|| (2 * sample + part) as usize)
                 };
                 let mut sums = Sums::default();
-                for (j, &w) in (-reach..).zip(&weights) {
+                for (j, &w) in (-(of_surfaces.len() as i64 / 2)..).zip(&of_surfaces) {
+                    if let Some(i) = at(j) {
+                        sums.weight += w;
+                        sums.surface += w * f64::from(surface[i]) * f64::from(row.surface_undo);
+                    }
+                }
+                for (j, &w) in (-(of_scatterers.len() as i64 / 2)..).zip(&of_scatterers) {
                     sums.full += w * w;
                     if let Some(i) = at(j) {
                         sums.here += w * w;
-                        sums.weight += w;
-                        sums.surface += w * f64::from(surface[i]) * f64::from(row.surface_undo);
                         sums.volume += w * f64::from(volume[i]) * f64::from(row.volume_undo);
                     }
                 }
                 let own = at(0).expect("the scanline itself is inside");
-                let scatterers = if frame.flags & FLAG_VOXEL != 0 {
-                    sums.volume * (sums.full / sums.here).sqrt()
-                } else {
-                    f64::from(volume[own]) * f64::from(row.volume_undo)
-                };
+                let point = points.get(own).map_or(0.0, |&v| f64::from(v));
+                let scatterers = sums.volume * (sums.full / sums.here).sqrt();
                 let noise = f64::from(frame.noise) * gaussian(words[part as usize]);
-                let echoes = sums.surface / sums.weight + scatterers;
+                let echoes =
+                    sums.surface / sums.weight + scatterers + point * f64::from(row.volume_undo);
                 out.push(echoes * coupling + noise);
             }
         }
@@ -58,10 +60,10 @@ pub fn beam(
 }
 
 /// Number of (l, k) at which some accumulator is at the fixed-point limit.
-pub fn saturated(surface: &[i32], volume: &[i32]) -> u32 {
-    let full = |v: &[i32]| v.iter().any(|x| x.unsigned_abs() >= 1 << 30);
-    let pairs = surface.chunks(2).zip(volume.chunks(2));
-    pairs.filter(|(s, v)| full(s) || full(v)).count() as u32
+pub fn saturated(accumulators: [&[i32]; 3]) -> u32 {
+    let full = |v: &[i32], i: usize| v.iter().skip(i).take(2).any(|x| x.unsigned_abs() >= 1 << 30);
+    let pairs = (0..accumulators[0].len()).step_by(2);
+    pairs.filter(|&i| accumulators.iter().any(|v| full(v, i))).count() as u32
 }
 
 /// The factor on the echoes of line `l` of the frame: coupled share of the transmit aperture times that of the receive
@@ -94,7 +96,7 @@ struct Sums {
 }
 
 /// Gaussian weights of the lines -n..=n.
-fn weights(sigma: f64) -> Vec<f64> {
+pub(super) fn weights(sigma: f64) -> Vec<f64> {
     if sigma < NARROWEST {
         return vec![1.0];
     }
@@ -115,6 +117,7 @@ mod tests {
             surface_undo: 0.5,
             volume_undo: 0.25,
             lateral_lines,
+            strip_lines: lateral_lines,
             receive_reach: 1.0,
             ..Row::default()
         };
@@ -137,7 +140,7 @@ mod tests {
         let sums = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 2.0, 3.0_f32];
         let mut contact: Vec<f32> = share.map(|s| s as f32).to_vec();
         contact.extend(sums);
-        let out = beam(&frame, &rows, [&[200; 16], &[0; 16]], &contact);
+        let out = beam(&frame, &rows, [&[200; 16], &[0; 16], &[]], &contact);
         for (l, share) in share.into_iter().enumerate() {
             let expected = 100.0 * share * share;
             // Shares are given in single precision.
@@ -147,12 +150,12 @@ mod tests {
 
     // Closed forms in f64; 1e-12 is rounding.
     #[test]
-    fn a_uniform_wall_stays_uniform_to_the_edges_and_scatterers_stay_unsmoothed() {
+    fn a_uniform_wall_stays_uniform_to_the_edges_and_points_stay_unsmoothed() {
         let (frame, rows) = (frame(40, 2), rows(2, 1.7));
         let surface = vec![100; 160];
-        let mut volume = vec![0; 160];
-        volume[80] = 8;
-        let out = beam(&frame, &rows, [&surface, &volume], &joined(&frame));
+        let mut points = vec![0; 160];
+        points[80] = 8;
+        let out = beam(&frame, &rows, [&surface, &[0; 160], &points], &joined(&frame));
         for (i, v) in out.iter().enumerate() {
             let expected = if i == 80 { 52.0 } else { 50.0 };
             assert!((v - expected).abs() < 1e-12, "{i}: {v}");
@@ -164,7 +167,7 @@ mod tests {
         let (frame, rows) = (frame(41, 1), rows(1, 2.0));
         let mut surface = vec![0; 82];
         surface[2 * 20] = 1000;
-        let out = beam(&frame, &rows, [&surface, &[0; 82]], &joined(&frame));
+        let out = beam(&frame, &rows, [&surface, &[0; 82], &[]], &joined(&frame));
         let sum: f64 = out.iter().sum();
         assert!((sum - 500.0).abs() < 1e-9);
         let ratio = (out[2 * 22] / out[2 * 20]).ln();
@@ -173,16 +176,15 @@ mod tests {
     }
 
     #[test]
-    fn voxel_scatterers_keep_their_power_at_the_edges() {
-        let mut frame = frame(200, 1);
-        frame.flags = FLAG_VOXEL;
+    fn scatterers_keep_their_power_at_the_edges() {
+        let frame = frame(200, 1);
         let rows = rows(1, 2.0);
         // Independent lines: power at the edge equals the middle's, over many draws.
         let (mut edge, mut middle) = (0.0, 0.0);
         for draw in 0..4000 {
             let noise = |i: u32| (1000.0 * gaussian(pcg4d([i, draw, 0, 0])[0])) as i32;
             let volume: Vec<i32> = (0..400).map(noise).collect();
-            let out = beam(&frame, &rows, [&[0; 400], &volume], &joined(&frame));
+            let out = beam(&frame, &rows, [&[0; 400], &volume, &[]], &joined(&frame));
             edge += out[0].powi(2) + out[1].powi(2);
             middle += out[200].powi(2) + out[201].powi(2);
         }
@@ -197,17 +199,18 @@ mod tests {
         frame.noise = 0.3;
         let rows = rows(100, 0.0);
         let zero = vec![0; 20_000];
-        let first = beam(&frame, &rows, [&zero, &zero], &joined(&frame));
+        let first = beam(&frame, &rows, [&zero, &zero, &[]], &joined(&frame));
         let power = first.iter().map(|x| x * x).sum::<f64>() / 20_000.0;
         assert!((power / 0.09 - 1.0).abs() < 0.04, "4 standard errors of 20 000 squares");
         frame.frame_index = 1;
-        assert_ne!(first, beam(&frame, &rows, [&zero, &zero], &joined(&frame)));
+        assert_ne!(first, beam(&frame, &rows, [&zero, &zero, &[]], &joined(&frame)));
     }
 
     #[test]
     fn saturation_is_counted_per_sample() {
         let full = 1 << 30;
-        assert_eq!(saturated(&[full, -full, 0, 0], &[0, 0, 0, full - 1]), 1);
-        assert_eq!(saturated(&[0, 0, 0, 0], &[i32::MIN, 0, 0, 0]), 1);
+        assert_eq!(saturated([&[full, -full, 0, 0], &[0, 0, 0, full - 1], &[]]), 1);
+        assert_eq!(saturated([&[0; 4], &[i32::MIN, 0, 0, 0], &[]]), 1);
+        assert_eq!(saturated([&[0; 4], &[i32::MIN, 0, 0, 0], &[0, 0, full, 0]]), 2);
     }
 }

@@ -2,7 +2,7 @@
 
 use glam::DAffine3;
 
-use super::scatter::{Tube, falling, is_finite};
+use super::scatter::{Tube, is_finite};
 use super::world::World;
 use super::{Accumulator, Segment};
 use insonify::sim::layout::FLAG_VOXEL;
@@ -33,13 +33,13 @@ pub fn expect(world: &World, segments: &[Segment], speckle: &[f32]) -> Vec<[f64;
             let echo = tube.weight(x, row) * tube.absorbed(x) * f64::from(tissue.level).exp2();
             let mut power = echo * echo * (to - from);
             if frame.flags & FLAG_VOXEL == 0 {
-                // As much wider, and twice as much fainter; a sample is as much longer as sound is faster.
+                // Fainter by as much as the beam would be wider; a sample is as much longer as sound is faster.
                 power *= f64::from(tissue.speed) / f64::from(frame.speed);
-                power /= tube.widened(x, falling(row)[0]).sqrt();
+                power /= tube.widened(x, row).sqrt();
             }
             let at = (scanline * frame.samples + k) as usize;
             let unit = f64::from(speckle[(k * frame.layers + layer) as usize]);
-            sums[at][usize::from(segment.reflections > 0)] += power * unit;
+            sums[at][usize::from(segment.reflected)] += power * unit;
         }
     }
     sums

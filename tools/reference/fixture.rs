@@ -35,7 +35,7 @@ impl Fixture {
         let identity = rows_of(&DAffine3::IDENTITY);
         let samples = 400;
         let row = Row {
-            shape: beam_shape([0.4, 0.6], 1.0, ALL_LEVELS.into()),
+            shape: beam_shape(0.8, 0.6, 1.0, ALL_LEVELS.into()),
             sigma_lateral: 0.4,
             sigma_elevation: 0.6,
             volume_gain: 1.0,
@@ -67,7 +67,7 @@ impl Fixture {
                 seed: 1,
                 cell: 0.25,
                 elevation_reach: 2.4,
-                lateral_cut: 3.0,
+                elevation_cut: 3.0,
                 surface_scale: 1.0,
                 volume_scale: 1.0,
                 segment_capacity: 1000,

@@ -48,6 +48,12 @@ pub fn line(frame: &Frame, l: u32, e: u32) -> Line {
     Line { origin, direction, lateral: DVec3::new(direction.z, 0.0, -direction.x) }
 }
 
+/// Distance between scanlines where sound leaves the face, mm, and its growth per mm of depth.
+pub fn line_pitch(frame: &Frame) -> [f64; 2] {
+    let probe = probe(frame);
+    [probe.line_pitch(0.0), probe.line_pitch(1.0) - probe.line_pitch(0.0)]
+}
+
 /// Amplitude factor of an echo `off` mm beside the geometric scanline.
 pub fn beam_weight(frame: &Frame, off: f64) -> f64 {
     let sigma = f64::from(frame.beam_width);

@@ -10,7 +10,9 @@ use super::random::{PURPOSE_NORMAL, PURPOSE_THICKNESS, draw, gaussian, pcg4d, un
 use super::stack::Stack;
 use super::wavefront::{Slope, turned};
 use super::world::{Crossing, World};
-use insonify::sim::layout::{BENDING_STEP, FLAG_COHERENT, Row, Surface, Tissue};
+use insonify::sim::layout::{
+    BENDING_ANGLE, BENDING_STEP, FLAG_COHERENT, LEAST_FACING, LEAST_PITCH, Row, Surface, Tissue,
+};
 
 /// Roughness exponent from which on a surface is a perfect mirror.
 pub(super) const MIRROR: f64 = 1e9;
@@ -149,6 +151,28 @@ impl Interface {
         let beside = through((n + step * self.turning).normalize());
         let bent = beside.zip(through(n)).map(|(beside, middle)| (beside - middle) / step);
         bent.map_or(0.0, |bent| bent.dot(path.lateral))
+    }
+
+    /// The neighbouring scanline's path behind the surface, refracted at normal `n`, where the path's lateral axis is
+    /// `beside`: it meets the surface's plane beside this path. At total reflection both go on as they came.
+    pub(super) fn strip_behind(&self, path: &Path, n: DVec3, beside: DVec3) -> [f64; 2] {
+        let [distance, growth] = path.strip;
+        let [before, behind] = self.fluids;
+        let facing = (-path.direction.dot(n)).max(LEAST_FACING.into());
+        let shift = path.lateral + path.lateral.dot(n) / facing * path.direction;
+        let least = f64::from(LEAST_PITCH);
+        let part = (f64::from(BENDING_STEP) / distance.abs().max(least))
+            .min(f64::from(BENDING_ANGLE) / growth.abs().max(least));
+        let aside = (path.direction + part * growth * path.lateral).normalize();
+        let turned = (n + part * distance * self.turning).normalize();
+        let both = (path.direction.dot(n) < 0.0)
+            .then(|| {
+                refract(before, behind, path.direction, n)
+                    .zip(refract(before, behind, aside, turned))
+            })
+            .flatten();
+        let behind = both.map_or(growth, |(middle, aside)| (aside - middle).dot(beside) / part);
+        [distance * shift.dot(beside), behind]
     }
 
     /// Deposits the echo that returns along the path: the part in phase at the surface, the rest displaced

@@ -1,4 +1,5 @@
-//! Twin of `scatter`: echoes of scatterers and point targets along the segments.
+//! Twin of `scatter`: echoes of scatterers and point targets along the segments. A scanline hears the scatterers of its own
+//! strip, and all point targets in its beam.
 
 mod lattices;
 mod others;
@@ -6,11 +7,12 @@ mod others;
 use glam::{DAffine3, DVec3};
 
 use super::field::Field;
-use super::geometry::{beam_weight, probe, world_line};
+use super::geometry::{beam_weight, line_pitch, probe, world_line};
 use super::world::World;
 use super::{Accumulator, Segment};
 use insonify::sim::layout::{
-    ALL_LEVELS, FLAG_VOXEL, MOST_WIDENED, Row, SCATTER_BIN, SCATTER_SLOT, Tissue, UNHEARD,
+    FLAG_VOXEL, LEAST_PITCH, MOST_WIDENED, Row, SCATTER_BIN, SCATTER_SLOT, STRIP_CUT, STRIP_LIMIT,
+    Tissue, UNHEARD,
 };
 
 /// Shift of the layers' borders, in their pitch, off the round numbers at which points lie: by rounding a point
@@ -62,12 +64,16 @@ type Loudest = Vec<f64>;
 
 /// True if a segment has numbers only.
 pub(super) fn is_finite(s: &Segment) -> bool {
-    let numbers = [s.length, s.time, s.weight, s.share].into_iter().chain(s.spread).chain(s.lens);
+    let numbers = [s.length, s.time, s.weight, s.share]
+        .into_iter()
+        .chain(s.spread)
+        .chain(s.lens)
+        .chain(s.strip);
     let vectors = [s.origin, s.direction, s.lateral];
     numbers.into_iter().all(f64::is_finite) && vectors.iter().all(|v| v.is_finite())
 }
 
-/// Echoes of all segments, in units of 1 / volume_scale.
+/// Echoes of the scatterers along all segments, in units of 1 / volume_scale.
 pub fn scatter(world: &World, segments: &[Segment]) -> Accumulator {
     let mut out = Accumulator::new(world.frame);
     let deformed = |instance: u32| {
@@ -101,14 +107,17 @@ pub fn scatter(world: &World, segments: &[Segment]) -> Accumulator {
                 tube.voxels(&mut out);
             }
         }
-        Tube::new(world, segment, DAffine3::IDENTITY, None).points(&mut out);
     }
     out
 }
 
-/// 1 / sigma^2 of the beam laterally and in elevation.
-pub(super) fn falling(row: &Row) -> [f64; 2] {
-    [row.sigma_lateral, row.sigma_elevation].map(|sigma| f64::from(sigma).powi(-2))
+/// Echoes of the point targets along all segments, in the same units.
+pub fn points(world: &World, segments: &[Segment]) -> Accumulator {
+    let mut out = Accumulator::new(world.frame);
+    for segment in segments.iter().filter(|s| is_finite(s)) {
+        Tube::new(world, segment, DAffine3::IDENTITY, None).points(&mut out);
+    }
+    out
 }
 
 impl<'a> Tube<'a> {
@@ -245,34 +254,36 @@ impl<'a> Tube<'a> {
         [-1.0, 1.0].map(|side| (side + 2.0 * POINT_SHIFT) * reach)
     }
 
-    /// Variance across of the beam at distance `x`, over that behind even surfaces, whose 1 / sigma^2 is `fall`: lenses
-    /// widen the transmitted and the received beam, and the product of both by half as much.
-    pub(super) fn widened(&self, x: f64, fall: f64) -> f64 {
+    /// Variance across of the beam at distance `x`, over that behind even surfaces, which `row` has: lenses widen the
+    /// transmitted and the received beam, and the product of both by half as much.
+    pub(super) fn widened(&self, x: f64, row: &Row) -> f64 {
         let [a, b, c] = self.segment.lens;
-        let off = a + x * (b + x * c);
-        1.0 + (0.5 * off * off * fall).min(MOST_WIDENED.into())
+        let off = (a + x * (b + x * c)) / f64::from(row.sigma_lateral);
+        1.0 + (0.5 * off * off).min(MOST_WIDENED.into())
     }
 
-    /// Lattice level that the beam asks for at sample `k`: one that is wider has more scatterers in it.
-    fn wanted(&self, k: usize) -> f64 {
-        let row = &self.world.rows[k];
-        if row.shape[3] <= ALL_LEVELS {
-            return row.shape[3].into();
-        }
-        let widened = self.widened(self.distance(k as f64 + 0.5), falling(row)[0]);
-        f64::from(row.shape[3]) + 0.5 * widened.log2()
+    /// Distance of the neighbouring scanlines' paths at distance `x`, over that of the scanlines, with its limits.
+    fn ratio(&self, x: f64) -> f64 {
+        let [pitch, growth] = line_pitch(self.world.frame);
+        let nominal = pitch + growth * f64::from(self.world.frame.speed) * self.time(x);
+        let [distance, wider] = self.segment.strip;
+        let limit = f64::from(STRIP_LIMIT);
+        ((distance + x * wider).abs() / nominal.max(LEAST_PITCH.into())).clamp(1.0 / limit, limit)
     }
 
-    /// Half the beam's width at sample `k`, mm: the beam's section is an ellipse, of which the
-    /// edge of the layer nearest to the middle is taken.
+    /// Half the strip's width at sample `k`, mm; 0 where the whole layer lies beyond the beam's edge in elevation.
     fn half_width(&self, k: usize) -> f64 {
-        let frame = self.world.frame;
         let row = &self.world.rows[k];
-        let widened = self.widened(self.distance(k as f64 + 0.5), falling(row)[0]);
-        let cut = f64::from(frame.lateral_cut);
-        let nearest = (self.layer_offset.abs() - f64::from(frame.elevation_reach)).max(0.0);
-        let height = nearest / (cut * f64::from(row.sigma_elevation));
-        cut * f64::from(row.sigma_lateral) * (widened * (1.0 - height * height).max(0.0)).sqrt()
+        if self.is_beyond(row) {
+            return 0.0;
+        }
+        f64::from(row.shape[0]) * self.ratio(self.distance(k as f64 + 0.5))
+    }
+
+    fn is_beyond(&self, row: &Row) -> bool {
+        let frame = self.world.frame;
+        let nearest = self.layer_offset.abs() - f64::from(frame.elevation_reach);
+        nearest >= f64::from(frame.elevation_cut) * f64::from(row.sigma_elevation)
     }
 
     /// Adds the echo at `from` the tube's origin; `amplitude` is without absorption and `beam`.
@@ -285,23 +296,28 @@ impl<'a> Tube<'a> {
         });
     }
 
-    /// The beam's two-way amplitude off its axis, with the widths of a row.
+    /// The two-way amplitude of a point off the beam's axis, with the widths of a row.
     fn beam(&self, from: DVec3, row: &Row) -> f64 {
-        self.beam_of(from, falling(row))
-    }
-
-    /// The same from 1 / sigma^2 laterally and in elevation.
-    fn beam_of(&self, from: DVec3, [lateral, elevation]: [f64; 2]) -> f64 {
-        let across = from.dot(self.lateral);
-        let up = self.layer_offset + from.dot(self.elevation);
-        let widened = self.widened(from.dot(self.direction), lateral);
+        let across = from.dot(self.lateral) / f64::from(row.sigma_lateral);
+        let up = (self.layer_offset + from.dot(self.elevation)) / f64::from(row.sigma_elevation);
+        let widened = self.widened(from.dot(self.direction), row);
         // As much fainter as it is wider.
-        let exponent = -0.5 * (across * across * lateral / widened + up * up * elevation);
-        exponent.exp() / widened.sqrt()
+        (-0.5 * (across * across / widened + up * up)).exp() / widened.sqrt()
     }
 
-    /// 1 / sigma^2 at distance `x`: the value of a row is that of its sample's middle, and between them lies the
-    /// parabola through the nearest three.
+    /// The two-way amplitude of a scatterer off the axis in a strip `half` to either side and as wide as `ratio` says, and a
+    /// beam whose 1 / sigma^2 in elevation is `falling`.
+    fn heard(&self, from: DVec3, row: &Row, ratio: f64, [half, falling]: [f64; 2]) -> f64 {
+        let across = from.dot(self.lateral).abs() / (half * ratio);
+        let share = strip_share(row, across);
+        let up = self.layer_offset + from.dot(self.elevation);
+        // A wider strip has more scatterers; behind a lens each is fainter by as much as it would be wider.
+        let fainter = ratio.sqrt() * self.widened(from.dot(self.direction), row).powf(0.25);
+        share * (-0.5 * up * up * falling).exp() / fainter
+    }
+
+    /// Half the strip's width among even surfaces and 1 / sigma^2 in elevation at distance `x`: the value of a row is that of
+    /// its sample's middle, and between them lies the parabola through the nearest three.
     fn between_rows(&self, x: f64, out: &Accumulator) -> [f64; 2] {
         let last = self.world.rows.len() - 1;
         let at = (out.kappa(self.time(x)) - 0.5).clamp(0.0, last as f64);
@@ -309,13 +325,29 @@ impl<'a> Tube<'a> {
             (at.round() as usize).clamp(1.min(last), last.saturating_sub(1).max(1.min(last)));
         let off = at - middle as f64;
         let [before, here, behind] = [middle.saturating_sub(1), middle, (middle + 1).min(last)]
-            .map(|k| falling(&self.world.rows[k]));
+            .map(|k| in_row(&self.world.rows[k]));
         std::array::from_fn(|i| {
             let slope = (behind[i] - before[i]) / 2.0;
             let bend = (behind[i] + before[i]) / 2.0 - here[i];
             here[i] + off * (slope + off * bend)
         })
     }
+}
+
+/// The part of a scatterer's amplitude that is heard at `off` of half the strip's width.
+fn strip_share(row: &Row, off: f64) -> f64 {
+    let core = f64::from(row.strip_core);
+    let deviations = f64::from(STRIP_CUT) * off;
+    match core < 0.0 {
+        _ if off >= 1.0 => 0.0,
+        true => (-deviations * deviations / 2.0).exp(),
+        false => ((1.0 - off) / (1.0 - core)).min(1.0),
+    }
+}
+
+/// Half a strip's width among even surfaces, mm, and 1 / sigma^2 in elevation.
+fn in_row(row: &Row) -> [f64; 2] {
+    [row.shape[0].into(), f64::from(row.sigma_elevation).powi(-2)]
 }
 
 #[cfg(test)]

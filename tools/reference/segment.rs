@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use insonify::sim::layout;
+use insonify::sim::layout::{self, REFLECTED};
 
 /// See [`layout::Segment`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,8 +24,10 @@ pub struct Segment {
     /// Lateral offset a + b x + c x^2, mm, of what comes one deviation beside the beam's axis, by surfaces that bend its
     /// wavefront.
     pub lens: [f64; 3],
-    /// Number of reflections on the way to its start.
-    pub reflections: u32,
+    /// Distance of the neighbouring scanline's path, mm, and its growth per mm.
+    pub strip: [f64; 2],
+    /// True if it was reflected on the way to its start.
+    pub reflected: bool,
     /// Share of the path among those that replace it.
     pub share: f64,
     /// Index of the tissue.
@@ -50,12 +52,13 @@ impl From<&layout::Segment> for Segment {
             weight: s.lateral_weight[3].into(),
             spread: [s.spread[0].into(), s.spread[1].into(), s.spread[2].into()],
             lens: [s.lens[0].into(), s.lens[1].into(), s.lens[2].into()],
-            reflections: s.lens[3] as u32,
+            strip: [s.strip.abs().into(), s.lens[3].into()],
+            reflected: s.line & REFLECTED != 0,
             share: s.spread[3].into(),
             tissue: s.tissue,
             instance: s.instance,
-            line: s.line,
-            handedness: s.handedness.into(),
+            line: s.line & !REFLECTED,
+            handedness: f64::from(s.strip).signum(),
         }
     }
 }
@@ -68,11 +71,11 @@ impl From<&Segment> for layout::Segment {
             direction_time: pack(s.direction, s.time),
             lateral_weight: pack(s.lateral, s.weight),
             spread: pack(DVec3::from(s.spread), s.share),
-            lens: pack(DVec3::from(s.lens), f64::from(s.reflections)),
+            lens: pack(DVec3::from(s.lens), s.strip[1]),
             tissue: s.tissue,
             instance: s.instance,
-            line: s.line,
-            handedness: s.handedness as f32,
+            line: s.line | if s.reflected { REFLECTED } else { 0 },
+            strip: (s.handedness * s.strip[0]) as f32,
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use glam::{DAffine3, DVec3};
 
-use super::geometry::{face, world_line};
+use super::geometry::{face, line_pitch, world_line};
 use super::interface::{self, Interface};
 use super::path::{PURPOSE_SURVIVAL, Path, Role, reflect, step, widen};
 use super::random::{PURPOSE_CHOICE, PURPOSE_JITTER, draw, gaussian, unit};
@@ -11,8 +11,8 @@ use super::straight::{Start, Toggled};
 use super::world::{World, affine};
 use super::{Accumulator, Segment, acoustics};
 use insonify::sim::layout::{
-    Counters, FLAG_FACE_REFLECTION, FLAG_ROUGH_TRANSMISSION, LEAST_SURVIVAL, SAMPLING_MAIN_PATH,
-    SAMPLING_SHARED_PRIMARY,
+    Counters, FLAG_FACE_REFLECTION, FLAG_ROUGH_TRANSMISSION, LEAST_PITCH, LEAST_SURVIVAL,
+    SAMPLING_MAIN_PATH, SAMPLING_SHARED_PRIMARY, STRIP_LIMIT,
 };
 
 /// The results of `trace`.
@@ -93,6 +93,10 @@ impl Tracer<'_> {
             reflections: 0,
             spread: [jitter * jitter, 0.0, fan],
             lens: [0.0; 3],
+            strip: {
+                let [pitch, growth] = line_pitch(frame);
+                [pitch + begin.travelled * growth, growth]
+            },
             survival: 1.0,
             stack: begin.media.clone(),
             t_min,
@@ -243,6 +247,7 @@ impl Tracer<'_> {
         path.spread = [a + 2.0 * b * t + c * t * t, b + c * t, c];
         let [a, b, c] = path.lens;
         path.lens = [a + b * t + c * t * t, b + 2.0 * c * t, c];
+        path.strip[0] += t * path.strip[1];
         path.t_min = step(path.origin);
     }
 
@@ -313,8 +318,10 @@ impl Tracer<'_> {
         };
         let row = &self.world.rows[self.out.surface.sample(path.time)];
         path.lens[2] += f64::from(row.aperture) * interface.bending(path, normal);
+        let lateral = (path.lateral - path.lateral.dot(direction) * direction).normalize();
+        path.strip = interface.strip_behind(path, normal, lateral);
         path.direction = direction;
-        path.lateral = (path.lateral - path.lateral.dot(direction) * direction).normalize();
+        path.lateral = lateral;
         path.stack = after;
         true
     }
@@ -324,6 +331,34 @@ impl Tracer<'_> {
         let row = &self.world.rows[self.out.surface.sample(path.time)];
         path.weight * path.survival * f64::from(row.compensation)
             < f64::from(self.world.frame.volume_floor)
+    }
+
+    /// Distance between scanlines where the path is, mm, and its growth per mm in `tissue`.
+    fn nominal(&self, path: &Path, tissue: u32) -> [f64; 2] {
+        let [pitch, growth] = line_pitch(self.world.frame);
+        let speed = f64::from(self.world.frame.speed);
+        let of_tissue = f64::from(self.world.tissues[tissue as usize].speed);
+        [pitch + growth * speed * path.time, growth * speed / of_tissue]
+    }
+
+    /// Distance of the neighbouring scanline's path: that of a main path, of reflected ones the scanline's.
+    fn strip(&self, path: &Path, tissue: u32) -> [f64; 2] {
+        if path.reflections > 0 {
+            return self.nominal(path, tissue);
+        }
+        let side = if path.strip[0] < 0.0 { -1.0 } else { 1.0 };
+        path.strip.map(|part| side * part)
+    }
+
+    /// True if a strip that neighbouring paths leave is wider or narrower than it may be, at one of its ends.
+    fn is_limited(&self, path: &Path, strip: [f64; 2], length: f64, tissue: u32) -> bool {
+        let nominal = self.nominal(path, tissue);
+        let (least, limit) = (f64::from(LEAST_PITCH), f64::from(STRIP_LIMIT));
+        let beyond = |x: f64| {
+            let ratio = (strip[0] + x * strip[1]).abs() / (nominal[0] + x * nominal[1]).max(least);
+            !(1.0 / limit..=limit).contains(&ratio)
+        };
+        nominal[0] > least && (beyond(0.0) || beyond(length))
     }
 
     /// Stores the segment of `length` ahead of the path, if scatterers or points can lie there.
@@ -350,6 +385,8 @@ impl Tracer<'_> {
             // Speckle adds in power.
             _ => (path.weight * path.survival.sqrt(), 1.0),
         };
+        let strip = self.strip(path, tissue);
+        self.out.counters.strips_limited += u32::from(self.is_limited(path, strip, length, tissue));
         self.out.segments[path.line as usize].push(Segment {
             origin: path.origin,
             length,
@@ -359,7 +396,8 @@ impl Tracer<'_> {
             weight,
             spread: path.spread,
             lens: path.lens,
-            reflections: path.reflections,
+            strip: [strip[0].max(LEAST_PITCH.into()), strip[1]],
+            reflected: path.reflections > 0,
             share,
             tissue,
             instance,

@@ -5,11 +5,14 @@ use std::f64::consts::TAU;
 use super::{Calibration, amplitude};
 use crate::scene::Tissue;
 use crate::settings::ScatterMode;
-use crate::sim::layout::{ECHO_LIMIT, LEVELS_PER_OCTAVE};
+use crate::sim::layout::{ECHO_LIMIT, LEVELS_PER_OCTAVE, STRIP_LIMIT};
 use crate::sim::tables::wire_spacing;
 
-/// Largest fixed-point scale: one unit is -120 dB re a perfect mirror.
+/// Largest fixed-point scale of surfaces: one unit is -120 dB re a perfect mirror.
 const LARGEST_SCALE: f64 = (1u32 << 20) as f64;
+/// Largest fixed-point scale of scatterers: near a phased array, where lines lie close together, each deposits an eighth of
+/// what its neighbours make of it.
+const LARGEST_VOLUME_SCALE: f64 = (1u32 << 23) as f64;
 
 /// Largest value of the kernels' Gaussian numbers: Box-Muller on u >= 2^-17.
 fn largest_gaussian() -> f64 {
@@ -48,7 +51,8 @@ impl Calibration<'_> {
         self.scene.tissues.iter().fold((0.0, 0.0), over)
     }
 
-    /// Bound on one component of the scatterers' sum in one sample at depth `z`, compensated.
+    /// Bound on one component of the sum of the scatterers that a line hears itself, in one sample at depth `z`,
+    /// compensated.
     ///
     /// Lattice: the terms are independent, of zero mean (random phase), at most M each and of
     /// total variance V, so Bernstein's inequality bounds the sum by L M / 3 + sqrt((L M / 3)^2 +
@@ -66,10 +70,14 @@ impl Calibration<'_> {
         let (sigma, reach) = (self.sigma_elevation(z), self.elevation_reach());
         let nearest = self.elevations().fold(f64::INFINITY, |n, y| n.min(y.abs()));
         let beside = (nearest - reach).max(0.0) / sigma;
-        let m = largest * gain * (-beside * beside / 2.0).exp();
-        // Half the power is in each component.
+        // In a narrower strip each scatterer is louder.
+        let narrowest = f64::from(STRIP_LIMIT).sqrt();
+        let m = narrowest * largest * gain * (-beside * beside / 2.0).exp();
+        // Half the power is in each component; what smoothing over lines adds is not in the sum.
+        let strip = self.strip(z);
+        let own = strip.own_energy() / strip.energy();
         let rms = self.speckle_target() * amplitude(self.compensation_db(z));
-        let v = power * rms * rms / self.axial_energy(0) / 2.0;
+        let v = own * power * rms * rms / self.axial_energy(0) / 2.0;
         let l = 35.0;
         2.0 * (l * m / 3.0 + ((l * m / 3.0).powi(2) + 2.0 * l * v).sqrt())
     }
@@ -114,9 +122,9 @@ impl Calibration<'_> {
             * amplitude(self.surface_compensation_db(z))
     }
 
-    /// Fixed-point scales of surface and volume: the largest powers of two up to 2^20 with which
-    /// the bounds above stay below 2^30 in every sample. The kernels clamp and count what is
-    /// beyond.
+    /// Fixed-point scales of surface and volume: the largest powers of two up to 2^20 and 2^23 with which the bounds above
+    /// stay below 2^30 in every sample. The kernels clamp and count what is beyond. Scatterers and points, each with sums of
+    /// their own, have the same.
     pub fn scales(&self) -> (f64, f64) {
         let pitch = self.scene.probe.sample_pitch();
         let (mut surface, mut volume) = (0f64, 0f64);
@@ -124,15 +132,15 @@ impl Calibration<'_> {
         for k in (0..self.scene.probe.samples + 16).step_by(16) {
             let z = f64::from(k.min(self.scene.probe.samples)) * pitch;
             surface = surface.max(self.surface_bound(z));
-            volume = volume.max(self.scatterer_bound(z) + self.point_bound(z));
+            volume = volume.max(self.scatterer_bound(z)).max(self.point_bound(z));
         }
-        (scale(1.05 * surface), scale(1.05 * volume))
+        (scale(LARGEST_SCALE, 1.05 * surface), scale(LARGEST_VOLUME_SCALE, 1.05 * volume))
     }
 }
 
-/// Largest power of two up to 2^20 whose product with `bound` is below 2^30.
-fn scale(bound: f64) -> f64 {
-    let mut scale = LARGEST_SCALE;
+/// Largest power of two up to `largest`, itself one, whose product with `bound` is below 2^30.
+fn scale(largest: f64, bound: f64) -> f64 {
+    let mut scale = largest;
     while scale * bound >= ECHO_LIMIT {
         scale /= 2.0;
     }

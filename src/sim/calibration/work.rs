@@ -1,6 +1,6 @@
 //! Work of a frame, known before it is begun.
 
-use super::{Calibration, LATERAL_CUT};
+use super::Calibration;
 use crate::scene::Scene;
 use crate::settings::ScatterMode;
 
@@ -40,7 +40,7 @@ impl Work {
 
 impl Calibration<'_> {
     /// Lattice cells that a frame looks at, were all of it the tissue that needs most: along every scanline those in
-    /// the beam's footprint and the slice, at the level of the lattice of each depth. Reflections come on top.
+    /// its strip and the slice, at the level of the lattice of each depth. Reflections come on top.
     pub fn lattice_cells(&self) -> f64 {
         let (probe, simulation) = (&self.scene.probe, &self.scene.simulation);
         if simulation.scatter_mode == ScatterMode::Voxel {
@@ -56,7 +56,7 @@ impl Calibration<'_> {
         let step = probe.depth / f64::from(DEPTHS);
         let along = (0..DEPTHS).filter_map(|k| {
             let z = (f64::from(k) + 0.5) * step;
-            let across = 2.0 * LATERAL_CUT * self.sigma_lateral(z) * probe.slice_thickness;
+            let across = 2.0 * self.strip(z).half * self.pitch(z) * probe.slice_thickness;
             Some(across * step / fewest(z)?)
         });
         along.sum::<f64>() * f64::from(probe.scanlines)

@@ -7,7 +7,16 @@ use crate::output::npy::Element::Float;
 /// The stage.
 pub const BEAM: Pass = Pass {
     name: "beam",
-    binds: &["frame", "rows", "surface_echoes", "volume_echoes", "counters", "lateral", "contact"],
+    binds: &[
+        "frame",
+        "rows",
+        "surface_echoes",
+        "volume_echoes",
+        "counters",
+        "lateral",
+        "contact",
+        "point_echoes",
+    ],
     makes: &[Array::new("lateral", Float, 2, Sizes::samples)],
     extent: Some(|f| Extent::Threads([f.samples, f.scanlines.div_ceil(BEAM_LINES), 1])),
     ..Pass::USUAL

@@ -1,30 +1,39 @@
 //! `scatter`: the echoes of scatterers along the segments.
 
 use super::super::batches::per_path;
-use super::super::layout::{FLAG_LINE, FLAG_VOXEL, Frame, SCATTER_WINDOW};
+use super::super::layout::{Frame, SCATTER_WINDOW};
 use super::super::pass::{Array, Extent, Pass, Sizes, Variants};
 use crate::output::npy::Element::Integer;
 
 /// The stage.
-pub const SCATTER: Pass = Pass {
-    name: "scatter",
-    variants: Variants::Tissue,
-    binds: &[
-        "frame",
-        "tissues",
-        "instances",
-        "rows",
-        "points",
-        "segments",
-        "segment_count",
-        "volume_echoes",
-        "counters",
-        "scanlines",
-        "fields",
-    ],
-    makes: &[Array::new("volume_echoes", Integer, 2, Sizes::samples).zeroed()],
-    ..Pass::USUAL
-};
+pub const SCATTER: Pass =
+    Pass {
+        name: "scatter",
+        variants: Variants::Tissue,
+        binds: &[
+            "frame",
+            "tissues",
+            "instances",
+            "rows",
+            "points",
+            "segments",
+            "segment_count",
+            "volume_echoes",
+            "counters",
+            "scanlines",
+            "fields",
+            "point_echoes",
+        ],
+        makes: &[
+            Array::new("volume_echoes", Integer, 2, Sizes::samples).zeroed(),
+            // Point targets are as wide as the beam at once, and are not smoothed with the scatterers.
+            Array::new("point_echoes", Integer, 2, |s| {
+                if s.frame.points > 0 { s.samples() } else { 1 }
+            })
+            .zeroed(),
+        ],
+        ..Pass::USUAL
+    };
 
 /// Parts into which the segments of a scanline are divided to keep a large GPU busy. Each part weighs all segments
 /// against each other once more, so that more of them are slower again: H200, segments of 7 layers, 1 / 2 / 4 / 8
@@ -36,9 +45,7 @@ const MOST_PARTS: u32 = 4;
 /// groups at once. Long lists of segments are divided among groups, and so are short ones where they leave more than half
 /// of the device idle; each group clears and writes its own window.
 pub fn extent(frame: &Frame, at_once: u32) -> Extent {
-    // The scatterers of lines beside one that is made alone are not heard: see the kernel.
-    let alone = frame.flags & (FLAG_LINE | FLAG_VOXEL) == FLAG_LINE;
-    let lines = if alone { 1 } else { frame.scanlines };
+    let lines = frame.scanlines;
     let windows = frame.samples.div_ceil(SCATTER_WINDOW);
     let paths = frame.segment_capacity / per_path(frame);
     let long = paths.div_ceil(8).clamp(1, 16);
@@ -61,7 +68,5 @@ mod tests {
         let long = groups(&frame, 0)[1];
         assert_eq!(groups(&frame, 8), [192, long, 2]);
         assert_eq!(groups(&frame, 1 << 12), [192, long.max(MOST_PARTS), 2]);
-        let line = Frame { flags: FLAG_LINE, ..frame };
-        assert_eq!(groups(&line, 1 << 12), [1, long.max(MOST_PARTS), 2]);
     }
 }

@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3, I64Vec3};
 
-use super::{Deformed, Loudest, Tube};
+use super::{Deformed, Loudest, Tube, in_row};
 use crate::reference::Accumulator;
 use crate::reference::lattice::{Level, level_power, wanted_level};
 use crate::reference::texture::factor;
@@ -73,14 +73,13 @@ impl Tube<'_> {
 
     /// Share of the power of lattice `number` at distance `x`, which lies in `bin`.
     fn power(&self, number: u32, x: f64, bin: u32, loudest: &Loudest, out: &Accumulator) -> f64 {
-        let wanted = self.wanted(self.sample(x, out));
+        let wanted = self.row(x, out).shape[3].into();
         let drowned = self.drowned(bin, loudest, out);
         drowned.map_or(0.0, |d| level_power(wanted_level(self.tissue, wanted, d), number))
     }
 
-    /// Echoes of one lattice, plane by plane. A cell counts if its centre lies within the beam's width, taken where
-    /// the axis crosses the plane's middle, and within the layer's slab; its scatterer, if it lies within the
-    /// segment's ends.
+    /// Echoes of one lattice, plane by plane. A cell counts if its centre lies within the layer's slab; its scatterer, if it
+    /// lies within the strip and within the segment's ends.
     fn planes(&self, number: u32, level: &Level, loudest: &Loudest, out: &mut Accumulator) {
         if self.bins(out).is_empty() {
             return;
@@ -104,11 +103,12 @@ impl Tube<'_> {
             let bins = self.bins(out);
             let bin = self.bin(on, out).clamp(bins.start, bins.end - 1);
             let power = self.power(number, x, bin, loudest, out);
-            if power == 0.0 {
+            if power == 0.0 || self.is_beyond(self.row(x, out)) {
                 continue;
             }
             let row = self.row(x, out);
-            let width = self.half_width(self.sample(x, out));
+            // A scatterer may lie as far as its cell's corner from its middle.
+            let width = 1.2 * self.half_width(self.sample(x, out)) + h;
             let strength =
                 self.weight(x, row) * power.sqrt() * factor(self.tissue, o + x * self.direction);
             let row_middle = o[b] - drift * da;
@@ -118,11 +118,6 @@ impl Tube<'_> {
                 let middle = o[c] - walk.tilt.dot(DVec2::new(da, db));
                 let slab = self.slab().map(|up| middle + up / self.elevation[c]);
                 for k in cells([slab[0].min(slab[1]), slab[0].max(slab[1])], h) {
-                    let up = ((k as f64 + 0.5) * h - middle) * self.elevation[c];
-                    let across = walk.across.dot(DVec2::new(da, db)) + walk.slant * up;
-                    if across.abs() > width {
-                        continue;
-                    }
                     let mut cell = I64Vec3::ZERO;
                     (cell[a], cell[b], cell[c]) = (i, j, k);
                     let Some(s) = level.scatterer(cell) else {
@@ -131,15 +126,18 @@ impl Tube<'_> {
                     let from = (cell.as_dvec3() + s.offset) * h - o;
                     let x = from.dot(self.direction);
                     if (0.0..self.segment.length).contains(&x) {
-                        let beam = self.beam_of(from, self.between_rows(x, out));
-                        self.echo(from, strength * s.amplitude, beam, out);
+                        let strip = self.between_rows(x, out);
+                        let heard = self.heard(from, row, self.ratio(x), strip);
+                        if heard > 0.0 {
+                            self.echo(from, strength * s.amplitude, heard, out);
+                        }
                     }
                 }
             }
         }
     }
 
-    /// Echoes of one lattice in deformed tissue, piece by piece: every scatterer that lies within the beam's width, the
+    /// Echoes of one lattice in deformed tissue, piece by piece: every scatterer that lies within the strip, the
     /// layer's slab and the piece, from wherever in the reference shape the field can bring it there.
     fn pieces(
         &self,
@@ -200,15 +198,19 @@ impl Tube<'_> {
                                 continue;
                             }
                             let row = self.row(x, out);
-                            let half = self.half_width(self.sample(x, out));
-                            let across = from.dot(self.lateral).abs() <= half;
                             let [low, high] = self.slab();
-                            if !across || !(low..high).contains(&from.dot(self.elevation)) {
+                            if self.is_beyond(row)
+                                || !(low..high).contains(&from.dot(self.elevation))
+                            {
                                 continue;
                             }
                             let power = self.power(number, x, bin, loudest, out);
                             let strength = self.weight(x, row) * power.sqrt() * texture;
-                            self.echo(from, strength * s.amplitude, self.beam(from, row), out);
+                            let ratio = self.ratio(x);
+                            let heard = self.heard(from, row, ratio, in_row(row));
+                            if heard > 0.0 {
+                                self.echo(from, strength * s.amplitude, heard, out);
+                            }
                         }
                     }
                 }

@@ -56,7 +56,7 @@ impl Tube<'_> {
             }
             let row = self.row(x, out);
             let sigma = f64::from(row.sigma_lateral);
-            let widened = self.widened(x, sigma.powi(-2));
+            let widened = self.widened(x, row);
             if from.dot(self.lateral).abs() > POINT_CUT * sigma * widened.sqrt() {
                 continue;
             }

@@ -12,7 +12,9 @@ fn segment(length: f64) -> Segment {
         weight: 1.0,
         spread: [0.0; 3],
         lens: [0.0; 3],
-        reflections: 0,
+        // The fixture's scanline has no neighbours: its pitch is the face's width.
+        strip: [10.0, 0.0],
+        reflected: false,
         share: 1.0,
         tissue: 0,
         instance: NONE,
@@ -34,7 +36,7 @@ fn magnitude(out: &Accumulator, k: usize) -> f64 {
 /// Relative error of a point's echo at 20 mm, off axis, in a tissue of 0.5 dB/(cm MHz) at 3 MHz.
 fn point_error(fixture: &Fixture) -> f64 {
     let [x, y] = [0.3f64, -0.5];
-    let out = scatter(&fixture.world(), &[segment(60.0)]);
+    let out = points(&fixture.world(), &[segment(60.0)]);
     // Two-way loss of 2 cm: 2 * 0.5 dB/(cm MHz) * 3 MHz * 2 cm = 6 dB of amplitude.
     let expected = 2.0
         * 10f64.powf(-6.0 / 20.0)
@@ -62,7 +64,7 @@ fn points_outside_the_beam_the_slab_or_the_segment_are_silent() {
     let seen = |fixture: &mut Fixture, p: [f32; 3], line: u32| {
         fixture.points = vec![[p[0], p[1], p[2], 1.0]];
         let s = Segment { line, ..segment(30.0) };
-        scatter(&fixture.world(), &[s]).exact.iter().any(|&v| v != 0.0)
+        points(&fixture.world(), &[s]).exact.iter().any(|&v| v != 0.0)
     };
     // Half a layer's slab is 1 mm, give or take a hundredth of a slab; lateral cut at 1.6 mm.
     assert!(seen(&mut fixture, [1.59, 0.97, 29.9], 1));
@@ -85,7 +87,7 @@ fn a_point_between_two_layers_belongs_to_one() {
                 line: layer,
                 ..segment(30.0)
             };
-            scatter(&fixture.world(), &[s]).deposits.iter().any(|&n| n > 0)
+            points(&fixture.world(), &[s]).deposits.iter().any(|&n| n > 0)
         };
         assert_eq!((0..3).filter(|&layer| heard(layer)).count(), 1, "{y}");
     }
@@ -99,7 +101,7 @@ fn elevation_weighs_the_distance_from_the_image_plane() {
     fixture.points = vec![[0.0, 1.5, 20.0, 1.0]];
     let s = Segment { origin: DVec3::new(0.0, 2.0, 0.0), line: 2, ..segment(30.0) };
     let total = |s| {
-        let out = scatter(&fixture.world(), &[s]);
+        let out = points(&fixture.world(), &[s]);
         magnitude(&out, 80) + magnitude(&out, 81)
     };
     let expected = (-(1.5f64 / 0.6).powi(2) / 2.0).exp();
@@ -109,14 +111,14 @@ fn elevation_weighs_the_distance_from_the_image_plane() {
     assert!((total(flipped) / expected - 1.0).abs() < 1e-6);
 }
 
-// Independent scatterers add their powers. The closed form integrates the beam's squares: lateral
-// sigma_l sqrt(pi) erf(3), elevation sigma_e sqrt(pi) erf(4), one sample each.
+// Independent scatterers add their powers. The closed form integrates the squares of what is heard: of a tent 0.8 mm to
+// either side 2/3 of 0.8 mm, in elevation sigma_e sqrt(pi) erf(4), one sample each.
 // 6 lattices of 200 samples, speckle of correlation length one sample: 4 / sqrt(1200) = 12 %.
 fn expected_power(fixture: &Fixture) -> f64 {
-    let sigmas = 0.4 * 0.6 * std::f64::consts::PI * 0.999_978;
+    let section = 2.0 / 3.0 * 0.8 * 0.6 * std::f64::consts::PI.sqrt();
     let t = fixture.tissues[0];
     let amplitude = f64::from(t.amplitude).powi(2);
-    amplitude / f64::from(fixture.frame.cell).powi(3) * sigmas * 0.25
+    amplitude / f64::from(fixture.frame.cell).powi(3) * section * 0.25
 }
 
 fn mean_power(fixture: &mut Fixture, segments: &[Segment]) -> f64 {
@@ -217,7 +219,7 @@ fn spread_averages_down_and_never_up() {
     fixture.points = vec![[0.0, 0.0, 20.0, 1.0]];
     let echo = |spread, share| {
         let s = Segment { spread, share, ..segment(60.0) };
-        let out = scatter(&fixture.world(), &[s]);
+        let out = points(&fixture.world(), &[s]);
         magnitude(&out, 80) + magnitude(&out, 81)
     };
     let close = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-6, "{a} {b}");
@@ -237,7 +239,7 @@ fn a_lens_widens_and_dims() {
     let mut echo = |lens, x| {
         fixture.points = vec![[x, 0.0, 20.0, 1.0]];
         let s = Segment { lens, ..segment(60.0) };
-        let out = scatter(&fixture.world(), &[s]);
+        let out = points(&fixture.world(), &[s]);
         magnitude(&out, 80) + magnitude(&out, 81)
     };
     let close = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-6, "{a} {b}");
@@ -290,27 +292,89 @@ fn every_level_is_as_bright_as_the_finest() {
     }
 }
 
-// A beam twice as wide behind a lens needs half of the scatterers; its level stays the same.
+// Behind a lens that makes a beam four times as wide each scatterer is heard with half the power; no more of them are.
 #[test]
-fn a_widened_beam_is_as_bright_with_fewer_scatterers() {
+fn a_lens_dims_speckle_by_what_it_widens_the_beam() {
     let mut fixture = Fixture::new(vec![tissue(1.5, 1.5, 0.0)]);
-    let s = Segment { lens: [1.0, 0.0, 0.0], ..segment(60.0) };
-    let mut measured = |level: f32, s: Segment| {
-        for row in &mut fixture.rows {
-            row.shape[3] = level;
-        }
+    let mut measured = |s: Segment| {
+        let power = mean_power(&mut fixture, &[s]);
+        (power, scatter(&fixture.world(), &[s]).deposits)
+    };
+    // The variance grows by half the offset's square over that of the beam, 0.16 mm^2.
+    let (even, behind) = (
+        measured(segment(60.0)),
+        measured(Segment { lens: [f64::sqrt(0.96), 0.0, 0.0], ..segment(60.0) }),
+    );
+    assert!((behind.0 / even.0 - 0.5).abs() < 1e-6, "{} {}", behind.0, even.0);
+    assert_eq!(behind.1, even.1);
+}
+
+// Where neighbouring paths lie twice as far apart, a line hears twice as many scatterers, each with half the power.
+#[test]
+fn a_wider_strip_is_as_bright_with_more_scatterers() {
+    let mut fixture = Fixture::new(vec![tissue(1.5, 1.5, 0.0)]);
+    let mut measured = |strip: [f64; 2]| {
+        let s = Segment { strip, ..segment(60.0) };
         let (mut power, mut deposits) = (0.0, 0);
-        for seed in 0..20 {
+        for seed in 0..10 {
             fixture.frame.cell = 0.25 + 1e-3 * seed as f32;
-            power += mean_power(&mut fixture, &[s]) / 20.0;
+            power += mean_power(&mut fixture, &[s]) / 10.0;
             deposits += scatter(&fixture.world(), &[s]).deposits.iter().sum::<u32>();
         }
         (power, f64::from(deposits))
     };
-    let (fine, thinned) = (measured(ALL_LEVELS, s), measured(1.0, s));
-    let even = measured(1.0, segment(60.0));
-    assert!((thinned.0 / fine.0 - 1.0).abs() < 0.1, "{thinned:?} {fine:?}");
-    assert!((thinned.1 / even.1 - 1.0).abs() < 0.1, "{thinned:?} {even:?}");
+    let even = measured([10.0, 0.0]);
+    // Its width is that at the middle, 30 mm away; the last is limited.
+    for (strip, ratio) in
+        [([20.0, 0.0], 2.0), ([5.0, 0.5], 2.0), ([-5.0, 0.0], 0.5), ([90.0, 0.0], 4.0)]
+    {
+        let (power, deposits) = measured(strip);
+        assert!((power / even.0 - 1.0).abs() < 0.1, "{strip:?}: {power} {even:?}");
+        assert!((deposits / even.1 / ratio - 1.0).abs() < 0.05, "{strip:?}: {deposits} {even:?}");
+    }
+}
+
+// Two lines side by side hear every scatterer as loud as one line that lies on it. Planted: strips with a gap.
+#[test]
+fn neighbouring_strips_share_scatterers_without_gaps() {
+    let mut fixture = Fixture::new(vec![tissue(1.5, 1.5, 0.0)]);
+    // Of one pitch, 0.8 mm: tents that reach to the next lines.
+    (fixture.frame.scanlines, fixture.frame.width) = (5, 4.0);
+    let of = |fixture: &Fixture, distance: f64| {
+        let lines = (0..5).map(|l| Segment {
+            origin: DVec3::new(0.8 * (f64::from(l) - 2.0), 0.0, 0.0),
+            strip: [0.8, 0.0],
+            line: l,
+            ..segment(60.0)
+        });
+        let lines: Vec<Segment> = lines.map(|s| Segment { strip: [distance, 0.0], ..s }).collect();
+        let out = scatter(&fixture.world(), &lines);
+        let line = |l: usize| &out.exact[l * 800..(l + 1) * 800];
+        (0..800).map(|i| line(1)[i] + line(2)[i] + line(3)[i]).collect::<Vec<f64>>()
+    };
+    // What three lines hear together is heard whole from the first to the last of them, and falls to nothing at the next.
+    let three = of(&fixture, 0.8);
+    let shape = fixture.rows[0].shape[0];
+    for row in &mut fixture.rows {
+        row.shape[0] = 2.0 * shape;
+        row.strip_core = 0.5;
+    }
+    let one = of_middle(&fixture);
+    let off = three.iter().zip(&one).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    // Widths are given in single precision.
+    assert!(off < 1e-5, "{off}");
+    for row in &mut fixture.rows {
+        (row.shape[0], row.strip_core) = (shape, 0.0);
+    }
+    let gaps = of(&fixture, 0.7);
+    let off = gaps.iter().zip(&one).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    assert!(off > 0.1, "narrower strips leave gaps: {off}");
+}
+
+/// What the middle one of five lines hears alone.
+fn of_middle(fixture: &Fixture) -> Vec<f64> {
+    let s = Segment { strip: [0.8, 0.0], line: 2, ..segment(60.0) };
+    scatter(&fixture.world(), &[s]).exact[1600..2400].to_vec()
 }
 
 // If a second path is 20 dB louder, the first one needs a hundredth of its scatterers; its level stays the same.
