@@ -3,6 +3,7 @@
 // tools/validate.rs includes this file: the report shows what the tests prove.
 
 mod apertures;
+mod border;
 mod brightness;
 mod check;
 mod cole;

@@ -36,6 +36,7 @@ rows! {
     grain::speckle_grains_are_as_large_as_the_point_spread_function,
     grain::probe_motion_decorrelates_speckle_as_the_beam_overlaps,
     contrast::echogenicity_is_contrast,
+    border::a_border_along_the_beam_is_as_wide_as_the_beam,
     contrast::an_anechoic_cyst_is_as_dark_as_the_noise,
     shadow::fluid_enhances_what_lies_behind_it,
     shadow::bone_casts_a_shadow,
