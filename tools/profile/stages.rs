@@ -180,7 +180,10 @@ impl Sizes {
         let taps = |sigma: f32, deviations: f64, most: f64| {
             2.0 * (deviations * f64::from(sigma)).ceil().min(most) + 1.0
         };
-        let lateral = rows.iter().map(|row| taps(row.lateral_lines, 3.0, 16.0));
+        // Of surfaces and of scatterers.
+        let lateral = rows.iter().flat_map(|row| {
+            [row.lateral_lines, row.strip_lines].map(|lines| taps(lines, 3.0, 16.0))
+        });
         Self {
             lines: scanlines * layers,
             per_line: samples,
@@ -210,8 +213,8 @@ fn work(stage: &str, sizes: &Sizes, counters: &Counters) -> Option<Work> {
             80.0 * f64::from(counters.segments) + 8.0 * per_line * lines,
             20.0 * f64::from(counters.candidates) + 90.0 * f64::from(counters.deposits),
         ),
-        // Two accumulators in, baseband out; a multiplication and an addition for each part and for the
-        // weight, and the noise.
+        // Two accumulators in, baseband out (points have a third, where there are some); a multiplication and an addition
+        // for each part and for the weight, and the noise.
         "beam" => (24.0 * samples, (6.0 * lateral + 100.0) * samples),
         // Baseband in, IQ and level out.
         "axial" => (20.0 * samples, (4.0 * axial + 35.0) * samples),
