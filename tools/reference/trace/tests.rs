@@ -86,6 +86,79 @@ fn a_sphere_is_a_thin_lens() {
     assert_eq!(inside(&fixture), [0.0; 3], "rays have no width");
 }
 
+/// The strip of the first segment in tissue 1.
+fn strip_behind(fixture: &Fixture) -> [f64; 2] {
+    let out = run(fixture);
+    out.segments[0].iter().find(|s| s.tissue == 1).expect("behind the surface").strip
+}
+
+/// Two paths side by side meet an inclined plane one after the other and go on cos t / cos i times as far apart; those of a
+/// fan part c2 / c1 times as fast behind a plane across it, and behind the top of a sphere of radius R parallel ones part by
+/// (c2 / c1 - 1) / R for each mm between them.
+#[test]
+fn neighbouring_paths_part_as_refraction_says() {
+    let [c1, c2] = [1.5_f64, 1.6];
+    let fluids = || vec![tissue(c1 as f32, 1.5, 0.0), tissue(c2 as f32, 1.6, 0.0)];
+    let close = |[distance, growth]: [f64; 2], expected: [f64; 2], by: f64| {
+        assert!((distance / expected[0] - 1.0).abs() < by, "{distance} {expected:?}");
+        assert!(
+            (growth - expected[1]).abs() < by * expected[1].abs().max(1e-3),
+            "{growth} {expected:?}"
+        );
+    };
+    let pitch = 0.1_f32;
+    for flag in [0, FLAG_WAVEFRONT] {
+        let base = || {
+            let mut fixture = Fixture::new(fluids());
+            fixture.frame.flags |= flag;
+            (fixture.frame.max_reflections, fixture.frame.width) = (0, pitch);
+            for row in &mut fixture.rows {
+                row.sigma_wavefront = 2.0;
+            }
+            fixture
+        };
+        let incidence = 0.5_f64;
+        let mut inclined = base();
+        // In the image plane: a box whose upper side is turned about the elevation axis.
+        let turn = DAffine3::from_translation(DVec3::new(0.0, 0.0, 30.0))
+            * DAffine3::from_rotation_y(incidence);
+        inclined.block_at([-80.0, -80.0, 0.0], [80.0, 80.0, 60.0], 1, 0, &turn);
+        let transmitted = (c2 / c1 * incidence.sin()).asin();
+        let wider = f64::from(pitch) * transmitted.cos() / incidence.cos();
+        close(strip_behind(&inclined), [wider, 0.0], 1e-3);
+
+        let mut fan = base();
+        (fan.frame.kind, fan.frame.field_of_view) = (2, 0.01);
+        fan.block([-80.0, -80.0, 20.0], [80.0, 80.0, 90.0], 1, 0);
+        close(strip_behind(&fan), [0.2, 0.01 * c2 / c1], 1e-3);
+    }
+    let (mut ball, radius) = (Fixture::new(fluids()), 40.0);
+    ball.sphere(DVec3::new(0.0, 0.0, 10.0 + radius), radius, 48, 1, 0);
+    ball.frame.flags |= FLAG_WAVEFRONT;
+    (ball.frame.max_reflections, ball.frame.width) = (0, pitch);
+    for row in &mut ball.rows {
+        row.sigma_wavefront = 2.0;
+    }
+    // A sphere of triangles.
+    close(strip_behind(&ball), [0.1, 0.1 * (c2 / c1 - 1.0) / radius], 0.03);
+}
+
+/// What is reflected goes on as far apart as the scanlines: neighbours may have been reflected elsewhere.
+#[test]
+fn reflected_paths_are_as_far_apart_as_scanlines() {
+    let mut fixture = slab();
+    (fixture.frame.kind, fixture.frame.field_of_view) = (2, 0.01);
+    let out = run(&fixture);
+    let reflected: Vec<&Segment> = out.segments[0].iter().filter(|s| s.reflected).collect();
+    assert!(!reflected.is_empty());
+    for s in reflected {
+        let travelled = f64::from(fixture.frame.speed) * s.time;
+        assert!((s.strip[0] - 0.01 * travelled).abs() < 1e-6, "{:?}", s.strip);
+        assert!((s.strip[1] - 0.01).abs() < 1e-6);
+    }
+    assert_eq!(out.counters.strips_limited, 0);
+}
+
 // f64 against f64: 1e-5 only allows for depths stored in f32.
 #[test]
 fn transmission_is_beer_lambert_times_fresnel() {
