@@ -149,6 +149,8 @@ pub fn tissues() -> Vec<Tissue> {
         presence: 0.7,
         mean: 0.1,
         sigma: 0.8,
+        density: 0.4,
+        amplitude: 0.9,
         texture_depth: 0.3,
         texture_length: 4.0,
         seed,
