@@ -17,16 +17,16 @@ uvec2 hear(Stretch s, vec3 rel, float strength, int number, vec2 x, float drowne
     float kappa = kappa_at(s, along);
     uint row = row_at(kappa);
     float across = dot(rel, s.e_l);
-    vec4 shape = shape_at(s, row);
+    vec4 shape = rows[row].shape;
     if (!(half_width(s, shape, along) > 0.0)) return uvec2(0u);
     float share = strip_share(across, shape.x, rows[row].strip_core, strip_ratio(s, along));
     if (!(share > 0.0)) return uvec2(0u);
     float power = level_power(wanted_level(s.tissue, shape.w, drowned), number);
     if (!(power > 0.0)) return uvec2(0u);
     up += s.layer_y;
-    float exponent = shape.z - s.absorption * LOG2_E * along - shape.y * up * up;
+    float exponent = rows[row_at(kappa + 0.5)].shape.z - s.absorption * LOG2_E * along - shape.y * up * up;
     float turns = 2.0 * frame.frequency * (s.time + along / s.speed);
-    strength *= share * sqrt(power) * thinning(s, along, row);
+    strength *= share * scattered(s, along, row) * sqrt(power) * thinning(s, along, row);
     return uvec2(1u, deposit_near(kappa, strength * exp2(exponent) * phasor(-turns)));
 }
 

@@ -151,7 +151,7 @@ uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
         float da = (float(i) + 0.5) * h - rest[walk.a];
         float ahead = walk.step * da;         // distance from the middle to where the axis crosses the plane
         uint row = row_at(kappa_middle + ahead * per_mm);
-        vec4 shape = shape_at(s, row);
+        vec4 shape = rows[row].shape;
         float wanted = wanted_level(s.tissue, shape.w, drowned);
         float power = level_power(wanted, number);
         float x_plane = x_middle + ahead;
@@ -161,7 +161,7 @@ uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
         // Over the plane the beam's shape and the gain vary as a parabola through samples on both sides.
         uint below = row - min(row, span), above = min(row + span, frame.samples - 1u);
         float run = per_mm / max(float(above - below), 1.0);
-        vec3 here = shape.xyz, shape_below = shape_at(s, below).xyz, shape_above = shape_at(s, above).xyz;
+        vec3 here = shape.xyz, shape_below = rows[below].shape.xyz, shape_above = rows[above].shape.xyz;
         vec3 slope = (shape_above - shape_below) * run;
         vec3 bend = (shape_above + shape_below - 2.0 * here) * mix(0.0, 2.0 * run * run, above - below == 2u * span);
         // The values of a row belong to the middle of its sample.
@@ -198,10 +198,13 @@ uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
             float up = s.layer_y + dot(rel, s.e_e);
             float off_row = dx - row_ahead;
             vec3 change = off_row * (slope + off_row * bend);
+            // An echo on a sample has the gain of the sample's row.
+            float off_gain = off_row + 0.5 / per_mm;
+            change.z = off_gain * (slope.z + off_gain * bend.z);
             float share = strip_share(across, here.x + change.x, core, strip_ratio(s, along));
             if (!(share > 0.0)) continue;
             float exponent = constant + change.z - falling * dx - (here.y + change.y) * up * up;
-            vec2 v = strength * share * exp2(exponent) * phasor(-(turns_middle + dx * turns_per_mm));
+            vec2 v = strength * share * scattered(s, along, row) * exp2(exponent) * phasor(-(turns_middle + dx * turns_per_mm));
             v *= mix(-1.0, 1.0, (bits.z & 1u) == 0u);
             count.y += 1u;
             count.z += deposit_near(kappa_middle + dx * per_mm, v);
@@ -212,7 +215,8 @@ uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
 
 // Half the strip's width at the wider end of a piece.
 float end_width(Stretch s, vec2 x) {
-    return max(half_width(s, shape_at(s, row_at(kappa_at(s, x.x))), x.x), half_width(s, shape_at(s, row_at(kappa_at(s, x.y))), x.y));
+    uvec2 row = uvec2(row_at(kappa_at(s, x.x)), row_at(kappa_at(s, x.y)));
+    return max(half_width(s, rows[row.x].shape, x.x), half_width(s, rows[row.y].shape, x.y));
 }
 
 // Largest distance along the beam between a cell's scatterer and the crossing of its plane.
@@ -260,7 +264,7 @@ uvec3 march_bin(Stretch s, int bin, int piece) {
     float lowest = 1e9, highest = -1e9;
     int spans = clamp(whole(ceil(min((x.y - x.x) / LEVEL_SPAN, 64.0))), 2, 64);
     for (int i = 0; i <= spans; ++i) {
-        float wanted = wanted_level(s.tissue, shape_at(s, row_at(kappa_at(s, mix(x.x, x.y, float(i) / float(spans))))).w, drowned);
+        float wanted = wanted_level(s.tissue, rows[row_at(kappa_at(s, mix(x.x, x.y, float(i) / float(spans))))].shape.w, drowned);
         lowest = min(lowest, wanted);
         highest = max(highest, wanted);
     }

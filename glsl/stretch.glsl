@@ -106,13 +106,11 @@ float strip_ratio(Stretch s, float x) {
     return clamp(abs(s.strip.x + x * s.strip.y) / nominal, 1.0 / STRIP_LIMIT, STRIP_LIMIT);
 }
 
-// How the stretch hears scatterers at a row, as the row's `shape` says of a path among even surfaces. Behind a surface that
-// bends the wavefront, fewer of the beam's parts arrive together: a scatterer is fainter by as much as it would be wider.
-vec4 shape_at(Stretch s, uint row) {
-    vec4 shape = rows[row].shape;
-    if (all(equal(s.lens, vec3(0.0)))) return shape;
-    float narrow = narrowing(s, distance_at(s, float(row) + 0.5), row);
-    return vec4(shape.xy, shape.z + 0.25 * log2(narrow), shape.w);
+// The factor on the amplitude of a scatterer at distance x. Behind a surface that bends the wavefront fewer of the beam's parts
+// arrive together: a scatterer is fainter by as much as it would be wider.
+float scattered(Stretch s, float x, uint row) {
+    if (all(equal(s.lens, vec3(0.0)))) return 1.0;
+    return sqrt(sqrt(narrowing(s, x, row)));
 }
 
 // The part of a scatterer's amplitude that a scanline hears `across` mm beside its path, in a strip `wide` to either side, of

@@ -286,13 +286,21 @@ impl<'a> Tube<'a> {
         nearest >= f64::from(frame.elevation_cut) * f64::from(row.sigma_elevation)
     }
 
-    /// Adds the echo at `from` the tube's origin; `amplitude` is without absorption and `beam`.
-    fn echo(&self, from: DVec3, amplitude: f64, beam: f64, out: &mut Accumulator) {
+    /// Adds the echo at `from` the tube's origin; `amplitude` is without absorption and `beam`. Without a `gain` it is that of
+    /// the sample that it is added to.
+    fn echo(
+        &self,
+        from: DVec3,
+        amplitude: f64,
+        beam: f64,
+        gain: Option<f64>,
+        out: &mut Accumulator,
+    ) {
         let x = from.dot(self.direction);
         let scale = f64::from(self.world.frame.volume_scale);
         let amplitude = amplitude * self.absorbed(x) * beam;
         out.deposit_nearest(self.scanline, self.time(x), amplitude, |k| {
-            f64::from(self.world.rows[k].volume_gain) * scale
+            gain.unwrap_or_else(|| self.world.rows[k].volume_gain.into()) * scale
         });
     }
 
@@ -317,15 +325,26 @@ impl<'a> Tube<'a> {
     }
 
     /// Half the strip's width among even surfaces and 1 / sigma^2 in elevation at distance `x`: the value of a row is that of
-    /// its sample's middle, and between them lies the parabola through the nearest three.
+    /// its sample's middle.
     fn between_rows(&self, x: f64, out: &Accumulator) -> [f64; 2] {
+        self.parabola(out.kappa(self.time(x)) - 0.5, in_row)
+    }
+
+    /// The gain at distance `x`: an echo on a sample has that of the sample's row.
+    fn gain(&self, x: f64, out: &Accumulator) -> f64 {
+        let [octaves] = self.parabola(out.kappa(self.time(x)), |row| [row.shape[2].into()]);
+        octaves.exp2()
+    }
+
+    /// Values of rows, where the first has those of `at` = 0: between them lies the parabola through the nearest three.
+    fn parabola<const N: usize>(&self, at: f64, of: impl Fn(&Row) -> [f64; N]) -> [f64; N] {
         let last = self.world.rows.len() - 1;
-        let at = (out.kappa(self.time(x)) - 0.5).clamp(0.0, last as f64);
+        let at = at.clamp(0.0, last as f64);
         let middle =
             (at.round() as usize).clamp(1.min(last), last.saturating_sub(1).max(1.min(last)));
         let off = at - middle as f64;
         let [before, here, behind] = [middle.saturating_sub(1), middle, (middle + 1).min(last)]
-            .map(|k| in_row(&self.world.rows[k]));
+            .map(|k| of(&self.world.rows[k]));
         std::array::from_fn(|i| {
             let slope = (behind[i] - before[i]) / 2.0;
             let bend = (behind[i] + before[i]) / 2.0 - here[i];

@@ -129,7 +129,8 @@ impl Tube<'_> {
                         let strip = self.between_rows(x, out);
                         let heard = self.heard(from, row, self.ratio(x), strip);
                         if heard > 0.0 {
-                            self.echo(from, strength * s.amplitude, heard, out);
+                            let gain = Some(self.gain(x, out));
+                            self.echo(from, strength * s.amplitude, heard, gain, out);
                         }
                     }
                 }
@@ -209,7 +210,7 @@ impl Tube<'_> {
                             let ratio = self.ratio(x);
                             let heard = self.heard(from, row, ratio, in_row(row));
                             if heard > 0.0 {
-                                self.echo(from, strength * s.amplitude, heard, out);
+                                self.echo(from, strength * s.amplitude, heard, None, out);
                             }
                         }
                     }
