@@ -42,8 +42,11 @@ pub const SPECKLE_DEVIATION: f64 = 5.57;
 const SPECKLE_DIFFERENCE: f64 = 4.947;
 /// Mean excess of a value below black, in such differences: 10 / ln 10 dB.
 const EXCESS_BELOW_BLACK: f64 = 4.343 / SPECKLE_DIFFERENCE;
-/// Smallest correlation that still depends on the width; below, chance decides.
-const LEAST_CORRELATION: f64 = 0.2;
+/// Smallest correlation that still depends on the width; below, chance decides. From the second on a
+/// correlation counts fully.
+const LEAST_CORRELATION: (f64, f64) = (0.2, 0.4);
+/// Part of the far distances over which their weight rises, and falls at their end.
+const FAR_TAPER: f64 = 0.25;
 
 /// Differences at one distance.
 #[derive(Clone, Default)]
@@ -267,10 +270,13 @@ fn correlation(lags: &[Lag], longest: f64) -> Option<Correlation> {
         let differences = lags.iter().map(|lag| lag.differences.middle(&lag.beyond, tail));
         let differences: Vec<f64> = differences.collect();
         let (from, to) = ((FAR_LAGS.0 * half).min(LATEST_FAR_LAG * longest), FAR_LAGS.1 * half);
-        let is_far = |&i: &usize| (from..=to).contains(&distances[i]);
-        let far = (0..lags.len()).filter(is_far);
-        let (sum, count) = far.fold((0.0, 0.0), |(sum, count), i| {
-            (sum + differences[i] * lags[i].count(), count + lags[i].count())
+        // Weights rise and fall slowly: a class that came or went at once would let the width jump where the
+        // image changes by next to nothing, and settings would never settle.
+        let taper = FAR_TAPER * (to - from);
+        let weight = |u: f64| ((u - from) / taper).min((to - u) / taper).clamp(0.0, 1.0);
+        let (sum, count) = (0..lags.len()).fold((0.0, 0.0), |(sum, count), i| {
+            let weight = weight(distances[i]) * lags[i].count();
+            (sum + differences[i] * weight, count + weight)
         });
         let far = sum / count;
         if sum <= 0.0 {
@@ -280,12 +286,15 @@ fn correlation(lags: &[Lag], longest: f64) -> Option<Correlation> {
         let mut sums = [0.0; 2];
         for ((lag, u), difference) in lags.iter().zip(&distances).zip(&differences) {
             let r = 1.0 - (difference / far).powi(2);
-            if r < LEAST_CORRELATION && sums[1] > 0.0 {
+            let (least, full) = LEAST_CORRELATION;
+            let first = sums[1] == 0.0;
+            if r < least && !first {
                 break;
             }
+            let sure = if first { 1.0 } else { ((r - least) / (full - least)).min(1.0) };
             // The first may be beyond already, where scanlines lie wide apart.
             let r = r.max(0.05);
-            let weight = lag.count() * r * r * u * u;
+            let weight = sure * lag.count() * r * r * u * u;
             sums[0] += weight * -r.min(1.0).ln();
             sums[1] += weight * u * u;
         }
