@@ -269,9 +269,8 @@ fn band(simulator: &mut Simulator, scene: &Scene, width: f64) -> Result<Band, Ma
 /// The volume's levels in the scale of the log image: before the grey map.
 fn background(simulator: &mut Simulator, scene: &Scene) -> Result<Vec<f32>, MatchError> {
     let steps = simulator.fusion_steps()?.expect("the frame was fused");
-    let exponent = scene.imaging.grey_gamma.recip() as f32;
     let (prescan, _) = steps.prescan.as_chunks::<2>();
-    Ok(prescan.iter().map(|s| s[1].powf(exponent)).collect())
+    Ok(prescan.iter().map(|s| scene.imaging.level(f64::from(s[1])) as f32).collect())
 }
 
 /// Lets the scene be simulated everywhere from now on, and keeps of the band what shows the tissue that most of

@@ -6,6 +6,7 @@
 mod exam;
 mod field;
 mod fusion;
+mod grey;
 mod group;
 mod imaging;
 mod key;
@@ -15,20 +16,23 @@ pub mod suggest;
 mod surface;
 mod tissue;
 pub mod units;
+mod value;
 mod words;
 
 pub use exam::Exam;
 pub use field::Field;
 pub use fusion::{Blend, Display, Fusion, MaskSpeed, Surroundings};
+pub use grey::GreyMap;
 pub(crate) use group::group;
 pub use imaging::{Imaging, Live, Machine};
-pub use key::{Facts, Form, Group, Off, Row, Value, plain};
+pub use key::{Facts, Form, Group, Off, Row};
 pub use probe::{Kind, MAX_ELEVATION_LAYERS, Probe};
 pub use simulation::{
     Coherence, Quality, Refraction, Sampling, ScatterMode, Sequence, Simulation, TextureSpace,
 };
 pub use surface::Surface;
 pub use tissue::Tissue;
+pub use value::{Value, plain};
 pub use words::Words;
 pub(crate) use words::words;
 

@@ -26,6 +26,7 @@ const SCENE: &str = r#"
 background = "around"
 [probe]
 preset = "linear"
+bandwidth = 0.77
 scanlines = 48
 elevation_layers = 1
 samples = 800

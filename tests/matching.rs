@@ -19,6 +19,7 @@ const SCENE: &str = r#"# An island.
 background = "around"
 [probe]
 preset = "linear"
+bandwidth = 0.77
 elevation_layers = 1
 samples = 1600
 [simulation]

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::settings::{ScatterMode, Settings};
+use crate::settings::{GreyMap, Imaging, ScatterMode, Settings};
 
 /// Least scatterers per resolution cell for speckle: of fewer, single ones are seen.
 const FEWEST: f64 = 1.0;
@@ -24,7 +24,8 @@ pub struct Silent {
 
 /// Those of these settings; none as a rule.
 pub fn silent(settings: &Settings) -> Vec<Silent> {
-    let all = [slice(settings), lattice(settings), samples(settings), weight(settings)];
+    let all =
+        [slice(settings), lattice(settings), samples(settings), weight(settings), table(settings)];
     all.into_iter().flatten().collect()
 }
 
@@ -84,10 +85,20 @@ fn weight(settings: &Settings) -> Option<Silent> {
     })
 }
 
+fn table(settings: &Settings) -> Option<Silent> {
+    let Imaging { grey_map, grey_table, .. } = &settings.imaging;
+    let own = *grey_map != GreyMap::Table && *grey_table != Imaging::default().grey_table;
+    own.then(|| Silent {
+        path: "imaging.grey_table",
+        message: format!("the table is not used: the grey map is \"{grey_map}\""),
+        remedy: "set imaging.grey_map = \"table\", or leave the table out".to_owned(),
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::settings::{Imaging, Probe, Simulation};
+    use crate::settings::{Probe, Simulation};
 
     fn settings(probe: Probe) -> Settings {
         let cell = Simulation::default_cell(probe.frequency);
@@ -105,12 +116,13 @@ mod tests {
     #[test]
     fn each_is_told_alone() {
         type Change = fn(&mut Settings);
-        let changes: [(&str, Change); 5] = [
+        let changes: [(&str, Change); 6] = [
             ("probe.slice_thickness", |s| s.probe.slice_thickness = 0.0),
             ("simulation.cell", |s| s.probe.slice_thickness = 1e-3),
             ("simulation.cell", |s| s.simulation.cell = 3.0),
             ("probe.samples", |s| s.probe.samples = 64),
             ("simulation.min_weight", |s| s.simulation.min_weight = 0.5),
+            ("imaging.grey_table", |s| s.imaging.grey_table = vec![0.0, 10.0, 255.0]),
         ];
         for (path, change) in changes {
             let mut settings = settings(Probe::abdominal());

@@ -1,6 +1,6 @@
 //! Kinds of examination, and the settings with which a machine begins each.
 
-use super::{Imaging, Probe, Settings, words};
+use super::{GreyMap, Imaging, Probe, Settings, words};
 
 words! {
     /// The kind of an examination.
@@ -37,7 +37,7 @@ struct Preset {
     tgc_attenuation: f64,
     /// dB, from the face to full depth.
     tgc_sliders: [f64; 8],
-    grey_gamma: f64,
+    grey_map: GreyMap,
 }
 
 const FLAT: [f64; 8] = [0.0; 8];
@@ -45,33 +45,35 @@ const FLAT: [f64; 8] = [0.0; 8];
 impl Exam {
     /// All values are ours, chosen on the shipped scenes: makers do not publish theirs, and levels are relative to
     /// the machine's own full scale. What they follow: the heart is shown in higher contrast than organs, so that
-    /// walls stand out from blood; behind fluid the far sliders go down; the lung is shown without added contrast,
-    /// since its artefacts are what is read.
+    /// walls stand out from blood; behind fluid the far sliders go down; the lung is shown in less contrast, since its
+    /// artefacts are what is read; with this gain and grey map the liver is as dark, and its speckle as skewed to bright,
+    /// as in clinical frames (`tests/greys.rs`).
     fn preset(self) -> Option<Preset> {
         let preset = |probe: fn() -> Probe, depth, focus, dynamic_range| Preset {
             probe,
             depth,
             focus,
-            gain: 16.0,
+            gain: 28.0,
             dynamic_range,
             tgc_attenuation: 0.5,
             tgc_sliders: FLAT,
-            grey_gamma: 1.0,
+            grey_map: GreyMap::Toe,
         };
         Some(match self {
             Self::General => return None,
             Self::Abdomen => preset(Probe::abdominal, 160.0, 80.0, 60.0),
             Self::Cardiac => Preset {
+                gain: 37.0,
                 tgc_sliders: [0.0, -1.0, -3.0, -6.0, -9.0, -12.0, -16.0, -20.0],
-                grey_gamma: 1.2,
                 ..preset(Probe::cardiac, 160.0, 80.0, 54.0)
             },
             Self::Obstetric => Preset {
+                gain: 35.0,
                 tgc_sliders: [0.0, 0.0, 0.0, -2.0, -4.0, -7.0, -10.0, -12.0],
                 ..preset(Probe::abdominal, 140.0, 70.0, 60.0)
             },
-            Self::Vascular => Preset { grey_gamma: 1.2, ..preset(Probe::linear, 40.0, 20.0, 56.0) },
-            Self::SmallParts => preset(Probe::linear, 50.0, 25.0, 64.0),
+            Self::Vascular => Preset { gain: 34.0, ..preset(Probe::linear, 40.0, 20.0, 56.0) },
+            Self::SmallParts => Preset { gain: 34.0, ..preset(Probe::linear, 50.0, 25.0, 64.0) },
             Self::Lung => {
                 Preset { tgc_attenuation: 0.3, ..preset(Probe::abdominal, 120.0, 40.0, 66.0) }
             }
@@ -115,7 +117,8 @@ impl Exam {
         imaging.dynamic_range = preset.dynamic_range;
         imaging.tgc_attenuation = preset.tgc_attenuation;
         imaging.tgc_sliders = preset.tgc_sliders;
-        imaging.grey_gamma = preset.grey_gamma;
+        imaging.grey_map = preset.grey_map;
+        imaging.grey_gamma = 1.0;
     }
 
     /// The examination of these settings by name, with a star where they are not those of its preset.

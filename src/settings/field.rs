@@ -35,7 +35,14 @@ macro_rules! fields {
     };
 }
 
-fields!(f64 as Number, u32 as Whole, bool as Switch, &'static str as Word, String as Text);
+fields!(
+    f64 as Number,
+    u32 as Whole,
+    bool as Switch,
+    &'static str as Word,
+    String as Text,
+    Vec<f64> as List
+);
 
 impl<const N: usize> Field for [f64; N] {
     fn get(&self) -> Value {

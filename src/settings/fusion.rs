@@ -83,8 +83,8 @@ group! {
         black: f64,
             Facts::number(OFF, INF).by_default("a byte's 0, else the file's least")
                 .limits("finite, not `white`").label("Black");
-        /// Stored value that is shown white. Grey is linear between the two and clamped beyond; `grey_gamma` does not
-        /// apply to it.
+        /// Stored value that is shown white. Grey is linear between the two and clamped beyond; the grey map of
+        /// `[imaging]` does not apply to it.
         white: f64,
             Facts::number(OFF, INF).by_default("a byte's 255, else the file's largest")
                 .limits("finite, not `black`").label("White");

@@ -1,7 +1,7 @@
 //! Settings of image formation and of live quality.
 
 use super::units::{ATTENUATION, DURATION, LEVEL};
-use super::{Exam, group};
+use super::{Exam, Form, GreyMap, group};
 
 const OFF: f64 = f64::NEG_INFINITY;
 
@@ -35,9 +35,17 @@ group! {
         noise: f64 = -116.0,
             Facts::quantity(&LEVEL, OFF, 200.0).under("Noise and resolution")
                 .label("Noise").usual(-160.0, -60.0).off(OFF, "off");
-        /// Exponent of the grey map.
+        /// The grey in which levels between black and white are shown: `linear` in dB; with a dark `toe` or `long-toe`
+        /// as on scanners; an `s-curve`; or the curve of `grey_table`.
+        grey_map: GreyMap = GreyMap::Linear,
+            Facts::word::<GreyMap>().label("Grey map");
+        /// The curve of the grey map `table`: greys from 0 to 255 at evenly spaced levels from black to white, linear
+        /// between them. Other grey maps leave it out.
+        grey_table: Vec<f64> = vec![0.0, 255.0],
+            Facts::several(&Form::Number, [2, 256], 0.0, 255.0).limits("2 to 256 of 0 to 255");
+        /// Exponent by which the grey map is bent further.
         grey_gamma: f64 = 1.0,
-            Facts::number(0.01, 100.0).label("Grey map").usual(0.4, 2.5);
+            Facts::number(0.01, 100.0).label("Grey gamma").usual(0.4, 2.5);
         /// Factors on the point-spread function's widths: axial, lateral, elevational.
         psf_scale: [f64; 3] = [1.0; 3],
             Facts::numbers(&["axial", "lateral", "elevation"], 0.01, 100.0).under("Noise and resolution")

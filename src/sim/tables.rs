@@ -353,9 +353,7 @@ pub fn with_spheres(mut points: Vec<[f32; 4]>) -> Vec<[f32; 4]> {
     points
 }
 
-/// Grey level of each of 256 log-compressed values: 255 v^gamma.
+/// Grey, 0 to 255, of each of 256 log-compressed levels.
 pub fn grey_map(imaging: &Imaging) -> Vec<u32> {
-    (0..256)
-        .map(|i| (255.0 * (f64::from(i) / 255.0).powf(imaging.grey_gamma)).round() as u32)
-        .collect()
+    (0..256).map(|i| (255.0 * imaging.grey(f64::from(i) / 255.0)).round() as u32).collect()
 }

@@ -300,8 +300,8 @@ fn grey_bar(painter: &egui::Painter, area: Rect, place: &Place, frame: &Frame) {
     let mut mesh = Mesh::default();
     for i in 0..=STEPS {
         let share = i as f32 / STEPS as f32;
-        let level = f64::from(1.0 - share).powf(imaging.grey_gamma);
-        let colour = Color32::from_gray((255.0 * level).round() as u8);
+        let grey = imaging.grey(f64::from(1.0 - share));
+        let colour = Color32::from_gray((255.0 * grey).round() as u8);
         let y = bar.top() + share * bar.height();
         mesh.colored_vertex(pos2(bar.left(), y), colour);
         mesh.colored_vertex(pos2(bar.right(), y), colour);

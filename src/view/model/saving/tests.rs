@@ -300,7 +300,7 @@ fn settings_of_another_file_are_taken_and_undone() {
 /// What a file does not state follows its examination: another one, saved, must not move what was set since.
 #[test]
 fn another_examination_is_saved_with_what_was_set_since() {
-    use crate::settings::Exam;
+    use crate::settings::{Exam, GreyMap};
     let folder = tempfile::tempdir().expect("a folder");
     let (path, now) = (folder.path().join("scene.toml"), Instant::now());
     let load = || {
@@ -316,7 +316,7 @@ fn another_examination_is_saved_with_what_was_set_since() {
             exam.apply(&mut model.settings);
             // As they were before, or as they are by default: neither is what the examination has.
             model.settings.imaging.dynamic_range = model.loaded.imaging.dynamic_range;
-            model.settings.imaging.grey_gamma = 1.0;
+            model.settings.imaging.grey_map = GreyMap::Linear;
             model.settings.probe.frequency = model.loaded.probe.frequency;
             model.save(None, false).expect("saved");
             let again = load();
