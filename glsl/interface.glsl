@@ -30,6 +30,16 @@ struct Echo {
     float late; vec2 behind;
 };
 
+// Share of an echo that the aperture receives of a surface whose small mirrors are spread about the normal n by its
+// roughness, 1 where it faces the path; the share of the energy that is the variance of their tilts goes everywhere. What is
+// in phase has its lobe by its neighbours' phases, which `beam` adds up.
+float received(vec3 d, vec3 n, float roughness, float lobe) {
+    float along = dot(d, n);
+    float facing = max(2.0 * along * along - 1.0, 0.0);
+    float diffuse = 2.0 / (roughness + 2.0);
+    return sqrt(mix(exp(-2.0 * lobe * (1.0 - facing * facing) / (1.0 + 8.0 * lobe * diffuse)), 1.0, diffuse));
+}
+
 // m is the sampled micro-normal.
 void make_echo(inout Echo echo, inout Path path, uint line, uint n, inout Interface at, vec3 m) {
     float coherence = surfaces[at.surface].coherence;
@@ -58,7 +68,8 @@ void make_echo(inout Echo echo, inout Path path, uint line, uint n, inout Interf
     vec3 p = tissue_point(at.instance, path.origin) * 2.0 + 0.381966;
     uvec3 cell = uvec3(ivec3(floor(p)));
     vec2 phase = phasor(unit(pcg4d(uvec4(cell, n * 0x9e3779b9u + frame.seed)).w));
-    float incoherent = sqrt((1.0 - coherence * coherence) * path.share * path.probability) * behind;
+    float incoherent = sqrt((1.0 - coherence * coherence) * path.share * path.probability) * behind
+        * received(path.direction, at.shading, surfaces[at.surface].roughness, rows[row_of(path.time)].lobe);
     echo.waiting = 3u;
     echo.late = late;
     echo.behind = incoherent * phase;

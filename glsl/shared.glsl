@@ -157,7 +157,9 @@ struct Row {
     float strip_lines;                            // deviation, in scanline pitches, by which beam smooths scatterers
     float strip_core;                             // share of the strip's width that is heard whole; to its edges the rest falls to 0;
                                                   // below 0: a narrow beam, which is heard as it is
-    float unused0; float unused1; float unused2;
+    float lobe;                                   // how fast the echo of a small mirror falls with its tilt: per squared sine
+                                                  // of the angle between what it reflects and the way back
+    float unused0; float unused1;
 };
 
 // A straight part of a path inside one medium.

@@ -230,7 +230,7 @@ shared! {
         volume_undo: f32, surface_undo: f32, lateral_lines: f32,
         tgc: f32, compensation: f32, incoherent_gain: f32, receive_reach: f32,
         black: f32, sigma_wavefront: f32, aperture: f32, strip_lines: f32,
-        strip_core: f32, unused0: f32, unused1: f32, unused2: f32,
+        strip_core: f32, lobe: f32, unused0: f32, unused1: f32,
     }
     /// A straight part of a path inside one medium.
     struct Segment {

@@ -237,6 +237,7 @@ pub fn rows(scene: &Scene) -> Vec<layout::Row> {
                 aperture: scene.probe.wavefront_aperture(z) as f32,
                 strip_lines: strip.smoothing as f32,
                 strip_core: strip.core as f32,
+                lobe: scene.probe.lobe(z) as f32,
                 ..layout::Row::default()
             }
         })

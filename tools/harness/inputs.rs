@@ -152,6 +152,7 @@ pub fn rows(frame: &Frame) -> Vec<Row> {
                 strip_lines: 0.02 + 0.05 * depth,
                 // Narrow beams at every eighth sample.
                 strip_core: if k % 8 == 5 { -1.0 } else { 0.8 - 0.01 * depth },
+                lobe: 10.0 + 0.2 * depth,
                 ..Row::default()
             }
         })

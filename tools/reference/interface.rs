@@ -35,6 +35,8 @@ pub(super) struct Micro {
 pub(super) struct Interface {
     /// Normal of the triangle.
     pub(super) geometric: DVec3,
+    /// Normal interpolated from the vertices.
+    shading: DVec3,
     /// Normal averaged over the wavefront, by which the path refracts.
     pub(super) refracting: DVec3,
     /// Change of `refracting` per mm across the path, in the image plane; 0 in geometric acoustics.
@@ -81,6 +83,7 @@ pub(super) fn meet(
     let cos_i = -d.dot(refracting);
     Interface {
         geometric,
+        shading,
         refracting,
         turning,
         micro: micro_normal(world, path, geometric, shading, roughness),
@@ -175,6 +178,14 @@ impl Interface {
         [distance * shift.dot(beside), behind]
     }
 
+    /// Share of the echo of direction `d` that the aperture receives: mirrors spread about the normal, 1 where it faces the path.
+    fn received(&self, d: DVec3, lobe: f64) -> f64 {
+        let facing = (2.0 * d.dot(self.shading).powi(2) - 1.0).max(0.0);
+        let diffuse = 2.0 / (self.roughness + 2.0);
+        let energy = (-2.0 * lobe * (1.0 - facing * facing) / (1.0 + 8.0 * lobe * diffuse)).exp();
+        (energy + diffuse * (1.0 - energy)).sqrt()
+    }
+
     /// Deposits the echo that returns along the path: the part in phase at the surface, the rest displaced
     /// by the thickness with a phase that belongs to the surface.
     pub(super) fn echo(&self, world: &World, path: &Path, out: &mut Accumulator) {
@@ -205,7 +216,8 @@ impl Interface {
             let key = path.n.wrapping_mul(0x9e37_79b9).wrapping_add(frame.seed);
             let words = pcg4d([cell.x as u32, cell.y as u32, cell.z as u32, key]);
             let phase = std::f64::consts::TAU * unit(words[3]);
-            let scale = rest * (path.share * path.probability).sqrt();
+            let lobe = f64::from(world.rows[out.sample(path.time)].lobe);
+            let scale = rest * (path.share * path.probability).sqrt() * self.received(d, lobe);
             let incoherent = |k: usize| gain(k) * f64::from(world.rows[k].incoherent_gain);
             out.deposit(l, time, scale * behind, phase, incoherent, dither);
         }

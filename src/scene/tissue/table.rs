@@ -53,7 +53,7 @@ type Skin = (f64, f64, f64);
 
 const SOFT: Skin = (1000.0, 0.1, 1.0);
 const FLUID: Skin = (1000.0, 0.05, 1.0);
-const BONE: Skin = (100.0, 0.3, 8.0);
+const BONE: Skin = (100.0, 0.3, 0.0);
 /// No scatterers.
 const ANECHOIC: Speckle = ((f64::NEG_INFINITY, "no scatterers"), 1.0, 0.0, 4.0);
 
@@ -191,13 +191,13 @@ const TABLE: &[(&str, Bulk, Speckle, Skin)] = &[
         "lung",
         [(0.949, ITIS_UNVERIFIED), (0.394, ITIS_UNVERIFIED), (40.0, A)],
         ((6.0, EYE), 0.5, 0.3, 4.0),
-        (100.0, 0.3, 2.0),
+        (100.0, 0.3, 0.0),
     ),
     (
         "air",
         [(0.343, "textbook, 20 C"), (0.0012, "textbook, 20 C"), (7.5, A)],
         ANECHOIC,
-        (100.0, 0.1, 2.0),
+        (100.0, 0.1, 0.0),
     ),
     (
         "vessel_wall",
