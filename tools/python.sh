@@ -15,7 +15,7 @@ if [ ! -f "$wanted" ] || [ "$(cat "$wanted")" != "${packages[*]}" ]; then
   }
   if ! made; then
     lacking="a virtual environment with ${packages[*]} (is PyPI within reach, and Debian's python3-venv there?): tests of the Python package are not run"
-    echo "tools/python.sh: no $lacking" >&2
+    echo "tools/python.sh: lacks $lacking" >&2
     [ -z "${INSONIFY_LACKS:-}" ] || echo "$lacking" >>"$INSONIFY_LACKS"
     exit 1
   fi

@@ -70,7 +70,7 @@ impl Exam {
             Self::Obstetric => Preset {
                 gain: 35.0,
                 tgc_sliders: [0.0, 0.0, 0.0, -2.0, -4.0, -7.0, -10.0, -12.0],
-                ..preset(Probe::abdominal, 140.0, 70.0, 60.0)
+                ..preset(Probe::abdominal, 140.0, 70.0, 72.0)
             },
             Self::Vascular => Preset { gain: 34.0, ..preset(Probe::linear, 40.0, 20.0, 56.0) },
             Self::SmallParts => Preset { gain: 34.0, ..preset(Probe::linear, 50.0, 25.0, 64.0) },
