@@ -42,7 +42,7 @@ group! {
         /// The curve of the grey map `table`: greys from 0 to 255 at evenly spaced levels from black to white, linear
         /// between them. Other grey maps leave it out.
         grey_table: Vec<f64> = vec![0.0, 255.0],
-            Facts::several(&Form::Number, [2, 256], 0.0, 255.0).limits("2 to 256 of 0 to 255");
+            Facts::several(&Form::Number, [2, 256], 0.0, 255.0);
         /// Exponent by which the grey map is bent further.
         grey_gamma: f64 = 1.0,
             Facts::number(0.01, 100.0).label("Grey gamma").usual(0.4, 2.5);

@@ -1,13 +1,13 @@
 //! The fetus measured on images of it: marks where an examiner sees the edges.
 //!
-//! The examiner waits until the fetus lies as it should; here it is laid so. Each measurement is taken on three images
+//! The examiner waits until the fetus lies as it should; here it is laid so. Each measurement is taken on nine images
 //! with speckle of their own, of which the worksheet takes the mean. Sizes are those that the model was made with. The
 //! femur is left out: its 7 mm are a few resolution cells, and its ends fade into the tissue around it.
 
 use glam::{DAffine3, DQuat, DVec2, DVec3};
 use insonify::exam::{Kind, Measured, Worksheet};
 use insonify::gpu::test_device;
-use insonify::settings::Exam;
+use insonify::settings::{Exam, GreyMap};
 use insonify::sim::shaders::Library;
 use insonify::sim::{Shot, Simulator, Tracer};
 
@@ -94,7 +94,7 @@ fn reached(way: &[(DVec2, f64)], power: f64) -> DVec2 {
     before.0.lerp(after.0, (power - before.1) / (after.1 - before.1))
 }
 
-/// Three images of the fetus as it lies, and the scene that they show.
+/// Nine images of the fetus as it lies, and the scene that they show.
 fn pictures(lie: &Lie) -> Vec<Picture> {
     let mut world_from_probe = scene("fetus.toml", &[]).world_from_probe;
     if lie.across {
@@ -112,9 +112,12 @@ fn pictures(lie: &Lie) -> Vec<Picture> {
     ];
     let mut scene = scene("fetus.toml", &laid);
     scene.world_from_probe = world_from_probe;
+    // Greys that tell the power: in dB, and the loudest edges not yet white.
+    let imaging = &mut scene.imaging;
+    (imaging.grey_map, imaging.gain, imaging.dynamic_range) = (GreyMap::Linear, 16.0, 60.0);
     let mut simulator =
         Simulator::new(&test_device(), &Library::embedded(), &scene, Tracer::Bvh).expect("made");
-    let shots = [1, 2, 3].map(|seed| Shot { seed, ..Shot::of(&scene, 0) });
+    let shots = [1, 2, 3, 4, 5, 6, 7, 8, 9].map(|seed| Shot { seed, ..Shot::of(&scene, 0) });
     simulator.frames(&scene, &shots).expect("no device error");
     let frame = *simulator.constants();
     let pitch = f64::from(frame.pixel_pitch);

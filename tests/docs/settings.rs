@@ -33,9 +33,9 @@ impl Line {
     }
 }
 
-/// The reference's word for a form.
-fn type_of(form: Form) -> String {
-    match form {
+/// The reference's word for what a key takes.
+fn type_of(facts: &Facts) -> String {
+    match facts.form {
         Form::Number => "number".to_owned(),
         Form::Quantity(measure) => measure.name.to_owned(),
         Form::Whole => "integer".to_owned(),
@@ -50,7 +50,10 @@ fn type_of(form: Form) -> String {
         Form::Texts => "list of texts".to_owned(),
         Form::OneOrSeveral => "text or list of texts".to_owned(),
         Form::TextOrTrue => "text or true".to_owned(),
-        Form::Several(_) => "list".to_owned(),
+        Form::Several(_) => match facts.counts {
+            Some([least, most]) => format!("{least} to {most} numbers"),
+            None => "list".to_owned(),
+        },
     }
 }
 
@@ -89,7 +92,7 @@ fn keys(document: &str) -> Vec<Line> {
                 _ => default,
             };
             let key = format!("`{key}`");
-            let cells = [&key, &type_of(facts.form), &default, &range_of(facts), facts.meaning()];
+            let cells = [&key, &type_of(facts), &default, &range_of(facts), facts.meaning()];
             out.push(Line::new(&section, "Key", &cells));
         }
     }
