@@ -15,6 +15,7 @@ name = "A plate in speckle"
 background = "own"
 [probe]
 preset = "linear"
+bandwidth = 0.77
 width = "12 mm"
 scanlines = 64
 elevation_layers = 3
