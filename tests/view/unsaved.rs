@@ -168,15 +168,15 @@ fn a_named_pose_is_added_gone_to_and_saved() {
         return;
     };
     let home = desk.settle(IMAGE);
-    let section = [1280 - 336, 413, 336, 60];
+    let section = [1280 - 336, 435, 336, 60];
     let closed = desk.grab(section);
-    desk.click((1000, 421));
+    desk.click((1000, 443));
     desk.wait_for("the section of poses", |d| difference(&d.grab(section), &closed) > 1.0);
     desk.settle(section);
-    let below = [1280 - 336, 456, 336, 20];
+    let below = [1280 - 336, 478, 336, 20];
     let empty = desk.grab(below);
     // The field, and a name; Enter adds.
-    desk.click((1060, 442));
+    desk.click((1060, 464));
     "cyst".chars().for_each(|letter| desk.press(Key::Letter(letter)));
     desk.press(Key::Enter);
     // The field, which has the keyboard until then, moves into the row below.
@@ -185,7 +185,7 @@ fn a_named_pose_is_added_gone_to_and_saved() {
     (0..6).for_each(|_| desk.press(Key::Right));
     desk.wait_for("the image to move", |d| difference(&d.grab(IMAGE), &home) > 4.0);
     desk.settle(IMAGE);
-    desk.click((1020, 442));
+    desk.click((1020, 464));
     desk.wait_for("the pose again", |d| difference(&d.grab(IMAGE), &home) < 1.5);
     desk.hold_control(Key::Letter('s'));
     desk.wait_for("it to be saved", |d| d.scene().contains("[[pose]]\nname = \"cyst\"\n"));
