@@ -208,9 +208,11 @@ fn a_simulation_that_dies_is_told_and_started_again() {
         });
     };
     moves(&mut desk);
-    // Where the next one dies as well, it stands still.
+    // Where the next one dies as well, it stands still, and the message says so.
+    let message = desk.settle(TOLD);
     kill(&mut desk);
     std::fs::write(&die, "").expect("written");
+    desk.wait_for("it to stand still", |d| difference(&d.grab(TOLD), &message) > 1.0);
     let still = desk.settle(BESIDE);
     // It is still there where the first of the two came too soon after the last.
     let _ = std::fs::remove_file(&die);
