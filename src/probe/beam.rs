@@ -44,9 +44,10 @@ impl Probe {
     }
 
     /// Decrease of the amplitude of a small mirror at depth `z` that is tilted: e to the power of minus this times the
-    /// squared sine of the angle between what it reflects and the way back, twice the tilt. A Gaussian aperture sends, one receives:
-    /// with one deviation of each under the sines a and b, what is reflected by an angle t overlaps with what is received
-    /// in exp(-t^2 / (2 (a^2 + b^2))). Behind the focus the transmit aperture is seen under a smaller angle.
+    /// squared sine of the angle between what it reflects and the way back, twice the tilt. A Gaussian aperture
+    /// sends, one receives: with one deviation of each under the sines a and b, what is reflected by an angle t
+    /// overlaps with what is received in exp(-t^2 / (2 (a^2 + b^2))). Behind the focus the transmit aperture is seen
+    /// under a smaller angle.
     pub fn lobe(&self, z: f64) -> f64 {
         let transmitted = self.f_number_transmit * (z / self.focus).max(1.0);
         let sine = |f_number: f64| (std::f64::consts::TAU * APODISED * f_number).recip();

@@ -76,8 +76,10 @@ impl Facts {
                 let remedy = "give a vector such as [0, 0, 1]".to_owned();
                 return direction.is_none().then_some((cause, remedy));
             }
-            Value::List(all) if self.counts.is_some_and(|[a, b]| !(a..=b).contains(&all.len())) => {
-                let [least, most] = self.counts.unwrap_or_default();
+            Value::List(all)
+                if let Some([least, most]) = self.counts
+                    && !(least..=most).contains(&all.len()) =>
+            {
                 let cause = format!("{} has {} values", self.name(), all.len());
                 return Some((cause, format!("give {least} to {most} of them")));
             }

@@ -1,5 +1,7 @@
 //! Statistics of speckle.
 
+#![allow(dead_code, reason = "each program of tests uses some of them")]
+
 use std::f64::consts::LN_2;
 
 /// Mean.
@@ -69,6 +71,14 @@ pub fn autocovariance(rows: &[Vec<f64>], most: usize) -> Vec<f64> {
     };
     let zero = at(0);
     (0..=most).map(|lag| at(lag) / zero).collect()
+}
+
+/// Lag at which an autocovariance has fallen to a half of its first value, linear between lags.
+pub fn half_width(covariance: &[f64]) -> f64 {
+    let half = covariance[0] / 2.0;
+    let after = covariance.iter().position(|c| *c < half).expect("it falls");
+    let (above, below) = (covariance[after - 1], covariance[after]);
+    (after - 1) as f64 + (above - half) / (above - below)
 }
 
 /// The same rows, read across: element i of every row makes row i.

@@ -23,6 +23,7 @@ mod interfaces;
 mod intersections;
 mod invariance;
 mod levels;
+#[path = "../common/moments.rs"]
 mod moments;
 #[path = "../../tools/validate/page.rs"]
 mod page;

@@ -2,6 +2,7 @@
 
 use image::GrayImage;
 
+use crate::moments::{self, transposed};
 use crate::{Row, swept};
 
 /// Pixels per mm.
@@ -21,21 +22,7 @@ fn mean(levels: &[Vec<f64>]) -> f64 {
 
 /// Lag in pixels at which the autocovariance along the rows has fallen to a half.
 fn half_width(levels: &[Vec<f64>]) -> f64 {
-    let mean = mean(levels);
-    let at = |lag: usize| {
-        let pairs = levels.iter().flat_map(|row| row.iter().zip(&row[lag..]));
-        let sum: f64 = pairs.clone().map(|(a, b)| (a - mean) * (b - mean)).sum();
-        sum / pairs.count() as f64
-    };
-    let half = at(0) / 2.0;
-    let after = (1..60).find(|&lag| at(lag) < half).expect("it falls");
-    let (a, b) = (at(after - 1), at(after));
-    (after - 1) as f64 + (a - half) / (a - b)
-}
-
-fn transposed(levels: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    let column = |x: usize| levels.iter().map(|row| row[x]).collect();
-    (0..levels[0].len()).map(column).collect()
+    moments::half_width(&moments::autocovariance(levels, 59))
 }
 
 /// Mean over the columns of the brightest level about the plate's surface.

@@ -178,7 +178,8 @@ impl Interface {
         [distance * shift.dot(beside), behind]
     }
 
-    /// Share of the echo of direction `d` that the aperture receives: mirrors spread about the normal, 1 where it faces the path.
+    /// Share of the echo of direction `d` that the aperture receives: mirrors spread about the normal, 1 where it
+    /// faces the path.
     fn received(&self, d: DVec3, lobe: f64) -> f64 {
         let facing = (2.0 * d.dot(self.shading).powi(2) - 1.0).max(0.0);
         let diffuse = 2.0 / (self.roughness + 2.0);
