@@ -9,6 +9,11 @@ layout(std430, binding = 0) readonly buffer FrameBuffer { Frame frame; };
 layout(std430, binding = 1) readonly buffer PieceBuffer { vec4 pieces[]; };
 layout(std430, binding = 2) readonly buffer PrescanBuffer { float prescan[]; };
 layout(std430, binding = 3) buffer ShadedBuffer { float shaded[]; };
+layout(std430, binding = 4) readonly buffer ShadeBuffer { vec2 shades[]; };
+
+#include "numbers.glsl"
+#define APERTURES shades
+#include "aperture.glsl"
 
 void main() {
     uint k = gl_GlobalInvocationID.x;
@@ -20,7 +25,12 @@ void main() {
         for (uint i = first; i + 1u < first + MAX_PIECES; ++i) {
             if (pieces[i + 1u].x > float(k)) {
                 vec4 piece = pieces[i];
-                sum += exp(clamp(piece.y - piece.z * (float(k) - piece.x), -80.0, 80.0));
+                float left = clamp(piece.y - piece.z * (float(k) - piece.x), -80.0, 80.0);
+                if (loses_by_aperture()) {
+                    float lost = shade_lost(piece, float(k));
+                    left = aperture_nepers(e * frame.scanlines + l, float(k) * frame.sample_pitch / frame.speed, lost) - lost;
+                }
+                sum += exp(left);
                 break;
             }
         }

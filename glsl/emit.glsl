@@ -35,6 +35,28 @@ bool paths_are_alike() {
         && (frame.flags & FLAG_ROUGH_TRANSMISSION) == 0u;
 }
 
+// True for a main path that stands for all paths of its line: behind a surface that lets nothing through, or in its shadow, it
+// goes on, as parts of the aperture may reach beyond.
+bool goes_on_in_shadow() { return role == ROLE_MAIN && loses_by_aperture(); }
+
+// True for a shadowed path in a medium of another speed than tissue: those that reach beyond it come through tissue.
+bool is_passed_by(inout Path path, float speed) {
+    return path.shadowed && abs(speed - frame.speed) > OTHER_SPEED * frame.speed;
+}
+
+const float FOREVER = 1e18;
+
+// Writes what a main path loses up to a time, us, at the nodes that it reaches before: `rate` nepers per us from where it is;
+// in front of its start, and where it is not followed, nobody knows.
+void write_losses(uint line, inout uint node, inout Path path, float rate, float until, bool known) {
+    float spacing = frame.depth / (frame.speed * float(APERTURE_BANDS));
+    float lost = lost_of(path.weight);
+    for (; node <= APERTURE_BANDS && float(node) * spacing < until; ++node) {
+        float way = float(node) * spacing - path.time;
+        apertures[aperture_at(line, node)].y = mix(UNKNOWN, min(lost + rate * way, lost_of(0.0)), known && way >= 0.0);
+    }
+}
+
 // Distance between the paths of neighbouring scanlines, mm, and its growth per mm in a medium of speed c: what a main path
 // has carried here. Reflected ones, whose neighbours may have been reflected elsewhere, are as far apart as scanlines are.
 vec2 strip_of(inout Path path, vec2 nominal) {
@@ -47,9 +69,10 @@ vec2 strip_of(inout Path path, vec2 nominal) {
 void emit_segment(inout Path path, uint line, uint n, uint instance, float extent) {
     bool whole = paths_are_alike() && (frame.sampling == SAMPLING_MAIN_PATH
         || (frame.sampling == SAMPLING_SHARED_PRIMARY && path.interactions == 0u));
-    if (whole && n != 0u) return;
+    if (whole && n != 0u || again != 0u) return;
     if (!is_heard(media)) return;
     uint tissue = tissue_of(instance);
+    if (is_passed_by(path, tissues[tissue].speed)) return;
     if (!(extent > 0.0) || (tissues[tissue].presence <= 0.0 && frame.points == 0u)) return;
     if (path.branch && path.weight * path.survival * rows[row_of(path.time)].compensation < frame.volume_floor) return;
     uint slot = atomicAdd(segment_count[line], 1u);

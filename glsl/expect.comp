@@ -17,6 +17,8 @@ layout(std430, binding = 7) restrict readonly buffer SpeckleBuffer { float speck
 // Power that came straight, and power that was reflected before: 64 bits each, the lower half first.
 layout(std430, binding = 8) restrict buffer ExpectedBuffer { uvec4 expected[]; };
 
+layout(std430, binding = 9) restrict readonly buffer ApertureBuffer { vec2 apertures[]; };
+
 #include "transform.glsl"
 #include "probe.glsl"
 #include "stretch.glsl"

@@ -111,12 +111,13 @@ void write_down(uint slot, inout Path path, uint n, inout Interface at) {
     for (uint i = 0u; i < media.count; ++i) interactions[slot].media[i] = media.ids[i];
 }
 
-// The path as it arrived where it was written down.
-void recall(uint slot, out Path path, out Interface at) {
+// The path of a line as it arrived where it was written down; its weight is that of the whole beam.
+void recall(uint slot, uint line, out Path path, out Interface at) {
     path.origin = interactions[slot].origin_weight.xyz;
     path.weight = interactions[slot].origin_weight.w;
     path.direction = interactions[slot].direction_time.xyz;
     path.time = interactions[slot].direction_time.w;
+    if (loses_by_aperture()) path.weight *= exp(aperture_nepers(line, path.time, lost_of(path.weight)));
     path.lateral = interactions[slot].lateral_reflectance.xyz;
     path.spread = interactions[slot].spread.xyz;
     path.lens = interactions[slot].lens.xyz;
@@ -130,6 +131,7 @@ void recall(uint slot, out Path path, out Interface at) {
     path.left_instance = NONE;
     path.left_primitive = NONE;
     path.branch = false;
+    path.shadowed = false;
     path.survival = 1.0;
     at.geometric = interactions[slot].geometric_turn.xyz;
     at.turn = interactions[slot].geometric_turn.w;

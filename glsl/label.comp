@@ -35,6 +35,7 @@ layout(std430, binding = 13) restrict readonly buffer FrameBeforeBuffer { Frame 
 layout(std430, binding = 14) restrict readonly buffer InstancesBeforeBuffer { Instance instances_before[]; };
 layout(std430, binding = 15) restrict readonly buffer FieldsBeforeBuffer { vec4 fields_before[]; };
 layout(std430, binding = 16) restrict buffer LabelBuffer { Label labels[]; };
+layout(std430, binding = 17) restrict readonly buffer ApertureBuffer { vec2 apertures[]; };
 
 #include "triangle.glsl"
 #ifdef RAY_QUERY
@@ -52,6 +53,7 @@ layout(std430, binding = 16) restrict buffer LabelBuffer { Label labels[]; };
 #include "media.glsl"
 #include "path.glsl"
 #include "wavefront.glsl"
+#include "aperture.glsl"
 #include "crossings.glsl"
 #include "transmitted.glsl"
 #include "contact.glsl"
@@ -80,7 +82,8 @@ shared float way_incidence[MAX_WAYS];    // degrees, on the surface at which it 
 float incidence = NO_SURFACE;
 
 bool is_over(Path path) {
-    return way_count + 1u == MAX_WAYS || path.interactions >= frame.max_interactions || path.weight < frame.min_weight;
+    return way_count + 1u == MAX_WAYS || path.interactions >= frame.max_interactions
+        || (!loses_by_aperture() && path.weight < frame.min_weight);
 }
 
 void begin_way(Path path, uint instance, Medium way, bool heard, bool ends) {
@@ -141,6 +144,12 @@ vec3 place_before(uint instance, vec3 p) {
     return (q.x - a.w) * a.xyz + (q.y - b.w) * b.xyz + (q.z - c.w) * c.xyz;
 }
 
+// Factor on amplitudes by the aperture, in nepers, of the layers beside the middle of the slice.
+float beside_middle(uint l, float time, float lost) {
+    uint low = (frame.layers - 1u) / 2u, high = frame.layers / 2u;
+    return 0.5 * (aperture_nepers(low * frame.scanlines + l, time, lost) + aperture_nepers(high * frame.scanlines + l, time, lost));
+}
+
 void main() {
     uint line = gl_WorkGroupID.x;
     if (gl_LocalInvocationID.x == 0u) {
@@ -170,17 +179,19 @@ void main() {
         uint way = 0u;
         while (way + 1u < way_count && way_begin[way + 1u] <= float(k)) ++way;
         float here = float(k) - way_begin[way];
-        bool seen = way_tissue[way] != NONE;
+        float lost = way_origin[way].w + here * way_direction[way].w;
+        if (loses_by_aperture()) lost -= beside_middle(line, depth / frame.speed, lost);
+        bool seen = way_tissue[way] != NONE && !(loses_by_aperture() && lost > -log(frame.min_weight));
         uint instance = seen && way_instance[way] != frame.couplant ? way_instance[way] : NONE;
         vec3 place = way_origin[way].xyz + here * way_direction[way].xyz;
-        float loss = DECIBEL_PER_NEPER * (way_origin[way].w + here * way_direction[way].w);
+        float loss = DECIBEL_PER_NEPER * lost;
         vec3 moved = probe_point(place) - apply_point(frame_before.probe_from_world, place_before(instance, place));
         float met = NO_SURFACE;
         for (uint i = way_count; i > 1u; --i) {
             bool nearest = floor(way_begin[i - 1u] + 0.5) == float(k) && way_incidence[i - 1u] >= 0.0;
             met = mix(met, way_incidence[i - 1u], nearest);
         }
-        labels[at].tissue = way_tissue[way];
+        labels[at].tissue = seen ? way_tissue[way] : NONE;
         labels[at].instance = instance;
         labels[at].place_loss = mix(vec4(0.0), vec4(probe_point(place), loss), bvec4(seen));
         labels[at].moved_incidence = vec4(mix(vec3(0.0), moved, bvec3(seen)), met);

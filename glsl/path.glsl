@@ -17,6 +17,7 @@ struct Path {
     uint left_instance; uint left_primitive; // the triangle that it starts on; NONE: none
     float survival;     // probability with which it was followed; its weight is divided by it
     bool branch;
+    bool shadowed;      // a main path behind a surface that lets hardly anything through: only others of the aperture reach there
 };
 
 uvec4 draw(uint n, uint key, uint purpose) {
@@ -57,6 +58,7 @@ void begin(vec3 origin, vec3 direction, vec3 lateral, out Path path) {
     path.reflections = 0u;
     path.crossings = 0u;
     path.branch = false;
+    path.shadowed = false;
     path.survival = 1.0;
     path.left_instance = NONE;
     path.left_primitive = NONE;

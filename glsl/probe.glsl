@@ -12,6 +12,9 @@ float elevation(uint e) {
 // Scanlines of the whole face; the frame may be made of some of them.
 uint face_lines() { return frame.scanlines + frame.lines_beside; }
 
+// True if a scanline of the frame echoes; others say only what sound loses there.
+bool echoes_wanted(uint l) { return l - frame.echo_first < frame.echo_lines; }
+
 // Start, unit direction and unit lateral axis (in the scanline plane, perpendicular to the ray) of
 // scanline l in layer e.
 void probe_ray(uint l, uint e, out vec3 origin, out vec3 direction, out vec3 lateral) {

@@ -23,6 +23,7 @@ layout(std430, binding = 8) restrict buffer CounterBuffer { Counters counters; }
 layout(std430, binding = 9) restrict readonly buffer ScanlineBuffer { Scanline scanlines[]; };
 layout(std430, binding = 10) restrict readonly buffer FieldBuffer { vec4 fields[]; };   // of the deforming one
 layout(std430, binding = 11) restrict buffer PointEchoBuffer { int point_echoes[]; };   // where there are point targets
+layout(std430, binding = 12) restrict readonly buffer ApertureBuffer { vec2 apertures[]; };
 
 // True if any instance's tissue deforms. Two modules, as not every driver removes the code that a specialization
 // constant switches off, and the code for deformed tissue is the larger half.
@@ -315,6 +316,7 @@ void main() {
     window_begin = gl_WorkGroupID.z * SCATTER_WINDOW;
     bool voxel = (frame.flags & FLAG_VOXEL) != 0u;
     uint chunks = gl_NumWorkGroups.y;
+    if (!echoes_wanted(scanline)) return;
 
     for (uint i = thread; i < 2u * SCATTER_WINDOW; i += THREADS) echoes[i] = 0;
     for (uint i = thread; i < (BINS + 2u * uint(BESIDE)) * SLOTS; i += THREADS) loudest[i] = SILENT;

@@ -28,6 +28,7 @@ layout(std430, binding = 8) restrict readonly buffer StackBuffer { uint stacks[]
 layout(std430, binding = 9) restrict readonly buffer RowBuffer { Row rows[]; };
 layout(std430, binding = 10) restrict buffer PieceBuffer { vec4 pieces[]; };
 layout(std430, binding = 11) restrict readonly buffer ScanlineBuffer { Scanline scanlines[]; };
+layout(std430, binding = 12) restrict buffer ShadeBuffer { vec2 shades[]; };
 
 #include "triangle.glsl"
 #ifdef RAY_QUERY
@@ -46,6 +47,8 @@ layout(std430, binding = 11) restrict readonly buffer ScanlineBuffer { Scanline 
 #include "path.glsl"
 #include "start.glsl"
 #include "wavefront.glsl"
+#define APERTURES shades
+#include "aperture.glsl"
 
 // Level, in nepers of amplitude, that stands for no sound at all.
 const float DARK = -200.0;
@@ -103,4 +106,11 @@ void main() {
     last = next + MAX_PIECES - 1u;
     surrounding = tissues[frame.background].absorption;
     follow(path, media);
+    if (!loses_by_aperture()) return;
+    uint piece = line * MAX_PIECES;
+    for (uint node = 0u; node <= APERTURE_BANDS; ++node) {
+        float kappa = float(node) * float(frame.samples) / float(APERTURE_BANDS);
+        while (pieces[piece + 1u].x <= kappa) piece += 1u;
+        shades[aperture_at(line, node)].y = shade_lost(pieces[piece], kappa);
+    }
 }

@@ -45,6 +45,7 @@ const uint FLAG_SLOTS = 256u;       // ray query: several top-level entries of a
 const uint FLAG_MASKED = 512u;      // only what a masking instance encloses gives echoes
 const uint FLAG_WAVEFRONT = 1024u;  // surfaces refract by their mean slope over the wavefront's width
 const uint FLAG_LINE = 2048u;       // the image is one scanline: column image_left of those made, from the face down
+const uint FLAG_APERTURE = 4096u;   // losses count by the part of the aperture that they are in the way of
 const float LEAST_FACING = 0.125;   // cosine below which a surface is not taken to be more inclined
 const float LEAST_DESCENT = 0.001;  // part of its way by which a path goes down below a surface that it has met
 const float BENDING_STEP = 0.1;     // mm: how far from the axis the bending of a wavefront is found
@@ -53,6 +54,17 @@ const float MOST_WIDENED = 8.0;     // growth of a beam's variance across behind
 const float STRIP_LIMIT = 4.0;      // a scanline's strip of scatterers is at most this much wider or narrower than nominal
 const float STRIP_CUT = 2.5;        // deviations of a narrow beam at which its strip ends
 const float LEAST_PITCH = 1e-6;     // mm: smallest distance between scanlines, where all of them meet
+const uint APERTURE_BANDS = 48u;    // bands of equal depth in which the losses of main paths are compared
+const uint APERTURE_GROUPS = 4u;    // work groups that share the nodes of a block of scanlines
+const uint APERTURE_RAYS = 16u;     // rays from the aperture to a target
+const float APERTURE_ALIKE = 2e-3;  // nepers: scanlines lose alike in a band if no neighbours differ by more
+const float APERTURE_FRONT = 3.0;   // nepers lost in a band from which on it has a surface that lets hardly anything through
+const uint MAX_SCANLINES = 4096u;
+const float APERTURE_JUMP = 0.5;    // nepers lost in a band from which on the loss says how far into it a place lies
+const float HARDLY_PASSED = 0.05;   // part that a surface lets through below which a main path behind it is shadowed
+const float OTHER_SPEED = 0.1;      // part of the assumed speed by which that of tissue differs at most
+const float LEAST_PASSED = 1e-9;    // part of a main path's weight that goes on behind a surface that lets nothing through
+const float LEAST_MAIN = 1e-20;     // weight of a main path that sinks no further
 const uint REFLECTED = 0x80000000u; // bit of a segment's line: it was reflected on its way
 
 const uint BLEND_LINEAR = 0u;
@@ -101,6 +113,8 @@ struct Frame {
     float branch_floor;                                                       // amplitude below which branches are followed by chance
     uint couplant;
     uint first_line; uint lines_beside;   // number on the face of the first scanline made; scanlines of the face not made
+    uint echo_first; uint echo_lines;     // of those made, the ones that echo: the others say only what sound loses there
+    uint unused0; uint unused1;
 };
 
 // A scanline in probe space: its start (mm, without elevation) and its
@@ -159,7 +173,7 @@ struct Row {
                                                   // below 0: a narrow beam, which is heard as it is
     float lobe;                                   // how fast the echo of a small mirror falls with its tilt: per squared sine
                                                   // of the angle between what it reflects and the way back
-    float unused0; float unused1;
+    float transmit_half; float receive_half;      // mm: half the apertures that converge on this depth
 };
 
 // A straight part of a path inside one medium.

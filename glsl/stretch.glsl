@@ -1,6 +1,8 @@
 // A segment of a path as scatter.comp and expect.comp hear it: where its samples lie, how wide and how loud the beam is along it.
 //
-// The includer declares frame, tissues[], rows[] and segments[], and includes transform.glsl and probe.glsl.
+// The includer declares frame, tissues[], rows[], segments[] and apertures[], and includes transform.glsl and probe.glsl.
+
+#include "aperture.glsl"
 
 const float LOG2_E = 1.44269504;
 const float INVERSE_FALL = 1.38629436;    // 2 ln 2: times `shape.y` it is 1 / sigma^2 in elevation
@@ -18,6 +20,7 @@ struct Stretch {
     float speed; float absorption;
     vec2 off;            // distance from the geometric scanline, mm: at the start and per mm
     float layer_y;       // elevation of the line's layer, mm
+    uint line; float lost;   // nepers lost up to its start
     uint tissue; uint instance;
 };
 
@@ -45,6 +48,8 @@ Stretch world_stretch(uint at) {
     s.absorption = tissues[s.tissue].absorption;
     s.reflected = (segments[at].line & REFLECTED) != 0u;
     uint line = segments[at].line & ~REFLECTED;
+    s.line = line;
+    s.lost = lost_of(s.weight);
     s.layer_y = elevation(line / frame.scanlines);
     s.off = vec2(0.0);
     vec2 pitch = line_pitch();
@@ -76,10 +81,15 @@ bool is_finite(Stretch s) {
 bool sounds(Stretch s) { return tissues[s.tissue].presence > 0.0 && s.weight > 0.0 && is_finite(s); }
 
 // The factor on amplitudes: echoes that a rough reflection spreads over many resolution cells average out; a path off the
-// geometric scanline is received more weakly. `row` is that of the distance.
+// geometric scanline is received more weakly; on the main path losses count by the aperture. `row` is that of the distance.
 float thinning(Stretch s, float x, uint row) {
     float variance = s.spread.x + x * (2.0 * s.spread.y + x * s.spread.z);
     float beam = beam_weight(s.off.x + x * s.off.y);
+    if (loses_by_aperture() && !s.reflected) {
+        float lost = s.lost + s.absorption * x;
+        float nepers = aperture_nepers(s.line, s.time + x / s.speed, lost);
+        beam *= mix(exp(nepers), 0.0, nepers - lost < log(frame.min_weight));
+    }
     if (variance <= 0.0) return beam;
     vec2 sigmas = vec2(rows[row].sigma_lateral, rows[row].sigma_elevation);
     vec2 widened = 1.0 + variance / (sigmas * sigmas);

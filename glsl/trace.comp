@@ -41,6 +41,8 @@ layout(std430, binding = 16) restrict buffer InteractionBuffer { Interaction int
 layout(std430, binding = 17) restrict buffer InteractionCountBuffer { uint interaction_count[]; };
 layout(std430, binding = 18) restrict readonly buffer ScanlineBuffer { Scanline scanlines[]; };
 
+layout(std430, binding = 19) restrict buffer ApertureBuffer { vec2 apertures[]; };
+
 // The role of the paths. Copied to a variable, as naga knows no operations on specialization constants.
 layout(constant_id = 0) const uint ROLE = ROLE_WHOLE;
 uint role = ROLE;
@@ -52,6 +54,7 @@ layout(push_constant) uniform Push {
     uint turn;        // which of two counters deals them out; the other one is for the next dispatch
     uint block;       // paths that a worker takes one after the other at an interaction
     uint lanes;       // threads of a work group that are workers: fewer wait for the longest path of fewer
+    uint again;       // 1: main paths are followed once more, for their interactions only
 };
 
 // True if everything but masks is transparent to rays.
@@ -88,6 +91,7 @@ uint row_of(float time) {
     return sample_at(frame.speed * time / frame.sample_pitch);
 }
 
+#include "aperture.glsl"
 #include "emit.glsl"
 #include "interface.glsl"
 
@@ -108,6 +112,7 @@ bool take(uint piece, out uint line, out uint next, out uint last, out uint main
     at -= blocks_before * slots;
     main_path = row * path_count + at / frame.max_interactions;
     slot = row * slots + at;
+    if (!echoes_wanted(line % frame.scanlines)) return false;
     if (at % frame.max_interactions >= interaction_count[main_path]) return false;
     next = interactions[slot].path;
     last = next + 1u;
@@ -174,12 +179,19 @@ void toggle(Met here, Met other, vec3 direction, uint copies) {
     // A loop, because drivers take time to compile each copy of the call.
     [[dont_unroll]] for (uint i = 0u; i < (other.hit.instance == NONE ? 1u : 2u); ++i) {
         bool enters = dot(direction, i == 0u ? here.normal : other.normal) < 0.0;
-        if (!cross_interface(after, i == 0u ? here.hit.instance : other.hit.instance, enters)) atomicAdd(counters.stack_overflow, copies);
+        bool fits = cross_interface(after, i == 0u ? here.hit.instance : other.hit.instance, enters);
+        if (!fits && again == 0u) atomicAdd(counters.stack_overflow, copies);
     }
 }
 
 // Refracts the path at normal n into the next medium; under total reflection its weight becomes 0.
 void transmit(inout Path path, inout Interface at, vec3 n) {
+    if (goes_on_in_shadow() && (path.shadowed || at.reflectance > 1.0 - HARDLY_PASSED)) {
+        path.shadowed = true;
+        path.weight *= max(1.0 - at.reflectance, LEAST_PASSED);
+        copy_media(media, after);
+        return;
+    }
     // If the middle of the beam is totally reflected but the rest is not, the path goes straight on.
     float c1 = tissues[at.before].speed, c2 = tissues[at.behind].speed;
     path.lens.z += rows[row_of(path.time)].aperture * bending(path.direction, path.lateral, n, at.turning, c1, c2);
@@ -187,7 +199,8 @@ void transmit(inout Path path, inout Interface at, vec3 n) {
     bool through = transmit_path(path, n, at.geometric, c1, c2) || at.curved;
     path.strip = strip_behind(path.strip, direction, lateral, path.lateral, n, at.turning, c1, c2);
     if (role == ROLE_MAIN) {
-        path.weight *= mix(0.0, 1.0 - at.reflectance, through && at.reflectance < 1.0);
+        float passed = mix(0.0, 1.0 - at.reflectance, through && at.reflectance < 1.0);
+        path.weight *= mix(passed, max(passed, LEAST_PASSED), goes_on_in_shadow());
     } else if (!through) {
         atomicAdd(counters.paths_lost, 1u);
         path.weight = 0.0;
@@ -213,6 +226,8 @@ void main() {
     float time_end = frame.depth / frame.speed;
     uint limit = 64u + frame.max_interactions;
     uint rays = 0u, met = 0u, written = 0u;
+    bool steady = goes_on_in_shadow();
+    uint node = 0u;
     // Number of paths for which this main path stands.
     uint copies = role == ROLE_MAIN && paths_are_alike() ? frame.paths : 1u;
     // The piece of work: paths of a line from `next` on; a main path, and the place of its interactions.
@@ -233,12 +248,15 @@ void main() {
     for (uint guard = 0u;; ++guard) {
         deposit_echo(echo, line, n);
         bool alive = going && path.interactions < frame.max_interactions && path.crossings < limit
-            && path.weight * path.survival >= frame.min_weight && path.time < time_end;
+            && (steady ? path.weight > 0.0 : path.weight * path.survival >= frame.min_weight) && path.time < time_end;
         bool recalled = false;
         Interface at;
         if (!alive || guard == guards) {
             if (next >= last || guard == guards) {
-                if (role == ROLE_MAIN && main_path != NONE) interaction_count[main_path] = written;
+                if (role == ROLE_MAIN && main_path != NONE) {
+                    interaction_count[main_path] = written;
+                    if (steady) write_losses(line, node, path, 0.0, FOREVER, path.weight > 0.0);
+                }
                 if (!take_next(quota, line, next, last, main_path, slot)) {
                     // Inside the loop: naga loses values that a loop carries when they are used after it.
                     if (rays > 0u) atomicAdd(counters.rays, rays);
@@ -247,6 +265,7 @@ void main() {
                     break;
                 }
                 written = 0u;
+                node = 0u;
                 pairing = false;
                 // A crossing takes three rays at most.
                 guard = 0u;
@@ -261,7 +280,11 @@ void main() {
                 aimed = frame.origin_jitter <= 0.0 && frame.emission_lobe <= 0.0;
                 continue;
             }
-            recall(slot, path, at);
+            recall(slot, line, path, at);
+            if (loses_by_aperture() && path.weight < frame.min_weight) {
+                going = false;
+                continue;
+            }
             aimed = false;
             recalled = true;
         } else {
@@ -269,7 +292,7 @@ void main() {
             Medium way = medium_of(tissue_of(before));
             bool heard = is_heard(media);
             // The acquired image assumes the probe's speed, so the way to the mask has it too.
-            if (!heard) way.speed = frame.speed;
+            if (!heard || is_passed_by(path, way.speed)) way.speed = frame.speed;
             float t_end = (time_end - path.time) * way.speed;
             float face = path.reflections > 0u ? face_distance(probe_point(path.origin), probe_vector(path.direction)) : -1.0;
             bool at_face = face > path.t_min && face < t_end;
@@ -282,7 +305,10 @@ void main() {
             rays += 1u;
             if (masks_only) {
                 // A path that misses all masks gives no more echoes.
-                if (hit.instance == NONE) path.weight = 0.0;
+                if (hit.instance == NONE) {
+                    if (steady) write_losses(line, node, path, 0.0, FOREVER, false);
+                    path.weight = 0.0;
+                }
                 aimed = true;
                 continue;
             }
@@ -296,6 +322,7 @@ void main() {
                 aimed = !heard;
                 if (hit.instance == NONE) {
                     emit_segment(path, line, n, before, t_end);
+                    if (steady) write_losses(line, node, path, way.absorption * way.speed, FOREVER, true);
                     if (!bounces) {
                         path.weight = 0.0;
                         continue;
@@ -341,7 +368,10 @@ void main() {
                 continue;
             }
             emit_segment(path, line, n, before, here.hit.t);
+            float met_at = path.time + here.hit.t / way.speed;
+            if (steady) write_losses(line, node, path, way.absorption * way.speed, met_at, true);
             advance(path, here.hit.t, way, here.position);
+            if (steady) path.weight = max(path.weight, LEAST_MAIN);
             leave(path, here.hit);
             if (passes) {
                 // The mask begins or ends within a medium: the segment is cut there. Outside the mask another
@@ -357,7 +387,8 @@ void main() {
             aimed = false;
             path.interactions += 1u;
             meet(at, here, entering, path, tissue_of(before), tissue_of(behind));
-            if (role == ROLE_MAIN) {
+            // The far side of what throws the shadow is hidden from all of the aperture.
+            if (role == ROLE_MAIN && !(path.shadowed && at.reflectance > 1.0 - HARDLY_PASSED)) {
                 write_down(slot + written, path, n, at);
                 written += 1u;
             }

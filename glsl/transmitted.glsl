@@ -1,7 +1,7 @@
 // The middle of a beam through the anatomy: what trace follows before anything random, transmitted at every surface.
 // It is a chain of straight ways, each in one medium, and is told to the includer way by way.
 //
-// The includer declares what path.glsl and wavefront.glsl need, and defines:
+// The includer declares what path.glsl and wavefront.glsl need, includes aperture.glsl, and defines:
 // true if the path is to end here
 bool is_over(Path path);
 // a way begins in a medium of this instance (NONE: the background); if it ends at once, nothing comes behind it
@@ -20,6 +20,8 @@ float pass(inout Path path, Met here, Medium t1, Medium t2) {
     Path before = path;
     bool through = transmit_path(path, slope.refracting, slope.geometric, t1.speed, t2.speed) || slope.width > 0.0;
     transmitted = mix(0.0, max(transmitted, 0.0), through);
+    // Parts of the aperture may reach beyond.
+    if (loses_by_aperture()) transmitted = max(transmitted, LEAST_PASSED);
     pass_surface(before, slope.shading, transmitted);
     return transmitted;
 }
@@ -105,6 +107,7 @@ void follow(inout Path path, inout Media media) {
             path.interactions += 1u;
             float transmitted = pass(path, here, t1, t2);
             path.weight = transmitted <= 0.0 ? -1.0 : path.weight * transmitted;
+            if (loses_by_aperture()) path.weight = max(path.weight, LEAST_MAIN);
         }
         copy_media(media, after);
     }

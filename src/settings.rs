@@ -26,9 +26,9 @@ pub use grey::GreyMap;
 pub(crate) use group::group;
 pub use imaging::{Imaging, Live, Machine};
 pub use key::{Facts, Form, Group, Off, Row};
-pub use probe::{Kind, MAX_ELEVATION_LAYERS, Probe};
+pub use probe::{Kind, MAX_ELEVATION_LAYERS, MAX_SCANLINES, Probe};
 pub use simulation::{
-    Coherence, Quality, Refraction, Sampling, ScatterMode, Sequence, Simulation, TextureSpace,
+    Coherence, Loss, Quality, Refraction, Sampling, ScatterMode, Sequence, Simulation, TextureSpace,
 };
 pub use surface::Surface;
 pub use tissue::Tissue;

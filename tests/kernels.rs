@@ -79,6 +79,7 @@ subjects!(
     refit,
     origin,
     trace,
+    aperture,
     scatter_rigid,
     scatter_deforming,
     beam,

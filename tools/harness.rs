@@ -6,6 +6,7 @@
 //! them by hand, `tests/kernels.rs` runs all of them.
 
 mod angles;
+mod aperture;
 mod axial;
 mod beam;
 mod blur;
@@ -296,7 +297,7 @@ impl Subject {
 }
 
 /// Every kernel of the image, in the order of a frame after the three that only tests use.
-pub const SUBJECTS: [Subject; 26] = [
+pub const SUBJECTS: [Subject; 27] = [
     angles::SUBJECT,
     geometry::SUBJECT,
     rays::SUBJECT,
@@ -304,6 +305,7 @@ pub const SUBJECTS: [Subject; 26] = [
     refit::SUBJECT,
     origin::SUBJECT,
     trace::SUBJECT,
+    aperture::SUBJECT,
     scatter::RIGID,
     scatter::DEFORMING,
     beam::SUBJECT,

@@ -6,6 +6,7 @@
 pub mod accumulator;
 pub mod acoustics;
 pub mod angles;
+pub mod aperture;
 pub mod axial;
 pub mod beam;
 pub mod blur;

@@ -57,6 +57,12 @@ impl Probe {
         self.focus / self.f_number_transmit
     }
 
+    /// Width of the part of the transmit aperture that lights depth `z` as one wave, mm: in front of the focus as much as
+    /// would be focused there, behind it all of it.
+    pub fn converging_aperture(&self, z: f64) -> f64 {
+        (z / self.f_number_transmit).min(self.transmit_aperture())
+    }
+
     /// Width of the aperture that receives from depth `z`, mm: it grows with the receive f-number up to
     /// the largest one. It may be wider than the face.
     pub fn receive_aperture(&self, z: f64) -> f64 {

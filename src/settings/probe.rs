@@ -10,6 +10,9 @@ use super::units::{ANGLE, FREQUENCY, LENGTH, SPEED};
 /// Most elevation layers: `scatter` counts the stretches of each (`MAX_ELEVATION_LAYERS` of glsl/shared.glsl).
 pub const MAX_ELEVATION_LAYERS: u32 = 64;
 
+/// Most scanlines: `aperture` keeps a byte for each in shared memory (`MAX_SCANLINES` of glsl/shared.glsl).
+pub const MAX_SCANLINES: u32 = 4096;
+
 /// Arrangement of the scanlines.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Kind {
@@ -39,7 +42,7 @@ group! {
     pub struct Probe in "probe", from files {
         /// Scanlines of the frame.
         scanlines: u32,
-            Facts::whole(1, 4096).under("Beam").label("Scanlines").usual(32.0, 512.0);
+            Facts::whole(1, MAX_SCANLINES).under("Beam").label("Scanlines").usual(32.0, 512.0);
         /// Planes across the slice in which paths are traced.
         elevation_layers: u32,
             Facts::whole(1, MAX_ELEVATION_LAYERS).under("Beam").label("Layers").usual(1.0, 15.0);

@@ -55,6 +55,16 @@ words! {
 }
 
 words! {
+    /// What is lost on the way to a target.
+    pub enum Loss {
+        /// The mean over the aperture that converges on it: shadows and borders have penumbras.
+        Beam = "beam",
+        /// What the scanline alone meets.
+        Ray = "ray",
+    }
+}
+
+words! {
     /// The model of the scatterers.
     pub enum ScatterMode {
         /// One point scatterer per cell of a lattice fixed to the tissue.
@@ -97,7 +107,8 @@ group! {
         /// Most reflections of one path.
         max_reflections: u32 = 3,
             Facts::whole(0, 256).under("Paths").label("Reflections").usual(0.0, 16.0);
-        /// Paths of less weight end; a path starts with 1.
+        /// Paths of less weight end; a path starts with 1. The main path goes on without echoes, as far as its own beam
+        /// is concerned (`loss`).
         min_weight: f64 = 1e-6,
             Facts::number(0.0, 1.0).under("Paths").label("Least weight").usual(1e-9, 1e-2);
         /// Echo of a thick surface: a coherent part at the surface and the rest as static speckle; or every path at
@@ -120,6 +131,11 @@ group! {
         /// its slope where the ray meets it, geometric acoustics.
         refraction: Refraction = Refraction::Beam,
             Facts::word::<Refraction>().under("Paths").label("Refraction");
+        /// `"beam"`: what absorption and reflection take away counts by the part of the aperture that it lies in front of, so
+        /// that shadows have penumbras as wide as sound makes them. `"ray"`: what the scanline alone meets. Paths that do
+        /// not start alike, or choose their way at random, are rays.
+        loss: Loss = Loss::Beam,
+            Facts::word::<Loss>().under("Paths").label("Loss");
         /// Standard deviation of the paths' lateral start about the scanline.
         origin_jitter: f64 = 0.0,
             Facts::quantity(&LENGTH, 0.0, 100.0).under("Paths").label("Origin jitter").usual(0.0, 2.0);
@@ -210,6 +226,19 @@ impl Simulation {
     /// True if frames have labels, and these have levels.
     pub fn levelled(&self) -> bool {
         self.labels && self.label_levels
+    }
+
+    /// True if the paths of a scanline are one path up to its reflections, which then stands for all of them.
+    pub fn has_one_main_path(&self) -> bool {
+        self.sampling == Sampling::MainPath
+            && self.origin_jitter <= 0.0
+            && self.emission_lobe == INF
+            && !self.rough_transmission
+    }
+
+    /// True if losses count by the part of the aperture that they lie in front of.
+    pub fn loses_by_aperture(&self) -> bool {
+        self.loss == Loss::Beam && self.has_one_main_path()
     }
 
     /// Share of its scatterers that a tissue keeps, 0..=1.

@@ -14,7 +14,7 @@ use std::f64::consts::{LN_10, PI, TAU};
 use super::layout::{AXIAL_REACH, LATERAL_REACH, LEVELS_PER_OCTAVE, SAMPLE_BLEND};
 use super::special::{erf, sinc};
 use crate::scene::{Scene, Tissue};
-use crate::settings::{Sampling, ScatterMode};
+use crate::settings::ScatterMode;
 
 /// RMS envelope of unattenuated liver relative to a perfect mirror, dB. No source gives it; at
 /// this level a fat/muscle interface (-19.7 dB) stands 25 dB above liver.
@@ -214,11 +214,8 @@ impl<'a> Calibration<'a> {
         }
         let shown = amplitude(-imaging.dynamic_range) / self.display_gain();
         let level = shown / (self.speckle_target() * amplitude(self.tgc_db(z)));
-        let alike = simulation.sampling == Sampling::MainPath
-            && simulation.origin_jitter <= 0.0
-            && simulation.emission_lobe == f64::INFINITY
-            && !simulation.rough_transmission;
-        let share = if alike { 1.0 } else { f64::from(simulation.paths.max(1)) };
+        let paths = f64::from(simulation.paths.max(1));
+        let share = if simulation.has_one_main_path() { 1.0 } else { paths };
         (level / share).log2()
     }
 

@@ -126,7 +126,7 @@ pub const KINDS: [LabelKind; 11] = [
     LabelKind {
         name: "loss",
         unit: "dB",
-        meaning: "level lost on the way there and back, by absorption and by what surfaces reflect",
+        meaning: "level lost on the way there and back, by absorption and by what surfaces reflect, over the aperture",
         part: Part::Number(|label| seen(label, [label.place_loss[3]])[0]),
     },
     LabelKind {

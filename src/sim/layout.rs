@@ -133,6 +133,8 @@ constants! {
     pub const FLAG_WAVEFRONT: u32 = 1024;
     /// The image is one scanline of those made, from the face down.
     pub const FLAG_LINE: u32 = 2048;
+    /// Losses count by the part of the aperture that they are in the way of.
+    pub const FLAG_APERTURE: u32 = 4096;
     /// Cosine to a surface below which what the wavefront covers of it grows no more.
     pub const LEAST_FACING: f32 = 0.125;
     /// A path goes down below a surface that it has met by this part of its way at least.
@@ -149,6 +151,28 @@ constants! {
     pub const STRIP_CUT: f32 = 2.5;
     /// Smallest distance between scanlines, mm, where all of them meet.
     pub const LEAST_PITCH: f32 = 1e-6;
+    /// Bands of equal depth in which the losses of main paths are compared.
+    pub const APERTURE_BANDS: u32 = 48;
+    /// Work groups that share the nodes of a block of scanlines.
+    pub const APERTURE_GROUPS: u32 = 4;
+    /// Rays from the aperture to a target.
+    pub const APERTURE_RAYS: u32 = 16;
+    /// Scanlines lose alike in a band if no neighbours differ by more nepers.
+    pub const APERTURE_ALIKE: f32 = 2e-3;
+    /// Nepers lost in a band from which on it has a surface that lets hardly anything through.
+    pub const APERTURE_FRONT: f32 = 3.0;
+    /// Most scanlines of a frame.
+    pub const MAX_SCANLINES: u32 = crate::probe::MAX_SCANLINES;
+    /// Nepers lost in a band from which on the loss says how far into it a place lies.
+    pub const APERTURE_JUMP: f32 = 0.5;
+    /// Part that a surface lets through below which a main path behind it is shadowed.
+    pub const HARDLY_PASSED: f32 = 0.05;
+    /// Part of the assumed speed by which that of tissue differs at most.
+    pub const OTHER_SPEED: f32 = 0.1;
+    /// Part of a main path's weight that goes on behind a surface that lets nothing through.
+    pub const LEAST_PASSED: f32 = 1e-9;
+    /// Weight of a main path that sinks no further.
+    pub const LEAST_MAIN: f32 = 1e-20;
     /// Bit of a segment's line: it was reflected on its way.
     pub const REFLECTED: u32 = 1 << 31;
 
@@ -198,6 +222,7 @@ shared! {
         image_width: u32, image_height: u32, pixel_pitch: f32, image_left: f32,
         image_top: f32, beam_width: f32, emission_lobe: f32, ray_mask: u32,
         branch_floor: f32, couplant: u32, first_line: u32, lines_beside: u32,
+        echo_first: u32, echo_lines: u32, unused0: u32, unused1: u32,
     }
     /// Start and direction of a scanline, in probe space; the last entry is the edge of the face.
     struct Scanline { x: f32, z: f32, sine: f32, cosine: f32 }
@@ -230,7 +255,7 @@ shared! {
         volume_undo: f32, surface_undo: f32, lateral_lines: f32,
         tgc: f32, compensation: f32, incoherent_gain: f32, receive_reach: f32,
         black: f32, sigma_wavefront: f32, aperture: f32, strip_lines: f32,
-        strip_core: f32, lobe: f32, unused0: f32, unused1: f32,
+        strip_core: f32, lobe: f32, transmit_half: f32, receive_half: f32,
     }
     /// A straight part of a path inside one medium.
     struct Segment {

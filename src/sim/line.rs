@@ -16,8 +16,11 @@ pub(super) struct OneLine {
     number: u32,
     /// Grey levels from the face to the image's depth.
     rows: u32,
-    /// Scanlines beside it, on each side, that it is smoothed with.
+    /// Scanlines beside it, on each side, that are made: those that it is smoothed with, and those that the apertures of
+    /// these reach over.
     reach: u32,
+    /// Scanlines beside it, on each side, that it is smoothed with.
+    smoothed: u32,
 }
 
 impl OneLine {
@@ -29,6 +32,8 @@ impl OneLine {
         frame.scanlines = (self.number + self.reach + 1).min(lines) - first;
         frame.lines_beside = lines - frame.scanlines;
         frame.flags |= layout::FLAG_LINE;
+        frame.echo_first = self.number.saturating_sub(self.smoothed) - first;
+        frame.echo_lines = (self.number + self.smoothed + 1).min(lines) - first - frame.echo_first;
         frame.image_width = 1;
         frame.image_height = self.rows;
         frame.image_left = (self.number - first) as f32;
@@ -36,8 +41,20 @@ impl OneLine {
     }
 }
 
+/// Scanlines on each side that an aperture reaches over, at most, at any depth in front of a target.
+fn aperture_reach(scene: &Scene, tables: &Tables) -> u32 {
+    if !scene.simulation.loses_by_aperture() {
+        return 0;
+    }
+    let halves = tables.rows.iter().flat_map(|row| [row.transmit_half, row.receive_half]);
+    let pitch = scene.probe.line_pitch(0.0);
+    // Rays converge, so that they are farthest from the scanline at the face; there the lines of a phased array meet.
+    let lines = (f64::from(halves.fold(0.0, f32::max)) / pitch).ceil();
+    lines.min(f64::from(scene.probe.scanlines)) as u32
+}
+
 /// Scanlines on each side over which `beam` smooths, at most, with these tables.
-fn reach(tables: &Tables) -> u32 {
+fn smoothed(tables: &Tables) -> u32 {
     let lines = tables.rows.iter().flat_map(|row| [row.lateral_lines, row.strip_lines]);
     let widest = lines.fold(0.0, f32::max);
     ((3.0 * widest).ceil() as u32).min(LATERAL_REACH as u32)
@@ -65,7 +82,9 @@ impl Simulator {
         assert!(rows > 0 && u64::from(rows) <= most, "{rows} rows of a line");
         // Also the tables of settings that this frame is the first to have.
         self.adopt(scene)?;
-        let line = OneLine { number, rows, reach: reach(&self.tables) };
+        let smoothed = smoothed(&self.tables);
+        let reach = smoothed + aperture_reach(scene, &self.tables);
+        let line = OneLine { number, rows, reach, smoothed };
         self.make(scene, &[Shot::of(scene, index)], Some(line))?;
         let rgba = self.read_again(pixels(false))?;
         Ok(rgba.chunks_exact(4).map(|pixel| pixel[0]).collect())

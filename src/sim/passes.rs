@@ -7,14 +7,15 @@ use std::time::{Duration, Instant};
 use super::batches::{Batches, FrameBudget};
 use super::contact::{self, Coupling, Skins};
 use super::lane::{Lane, Shot};
+use super::layout::{self, ROLE_BRANCHES};
 use super::line::OneLine;
 use super::pass::{Extent, Pass, Sizes, Variants};
 use super::shaders::Library;
 use super::stages::{
-    self, CONVERT, DARKEN, EXPECT, FUSE, MASK, ORIGIN, SCATTER, SHADOW, TRACE, scatter,
+    self, APERTURE, CONVERT, DARKEN, EXPECT, FUSE, MASK, ORIGIN, SCATTER, SHADOW, TRACE, scatter,
 };
 use super::tables::Tables;
-use super::{SimError, World, layout};
+use super::{SimError, World};
 use crate::gpu::{Binding, Buffer, Commands, Device, GpuError, Kernel, Stage};
 use crate::scene::Scene;
 use crate::settings::Blend;
@@ -187,6 +188,10 @@ impl Passes {
         }
     }
 
+    fn loses_by_aperture(&self) -> bool {
+        self.frame().flags & layout::FLAG_APERTURE != 0
+    }
+
     /// Records the echoes of all paths, batch after batch, and for labels of levels what is expected of them.
     pub(super) fn echoes(&self, cmd: &mut Commands, levelled: bool) -> Result<(), GpuError> {
         self.run(cmd, &ORIGIN)?;
@@ -216,7 +221,14 @@ impl Passes {
         }
         let path_end = self.frame().paths.min(path_begin + self.batches.paths);
         cmd.scope("trace");
+        let mut converges = self.loses_by_aperture();
         for round in self.batches.rounds.of(self.frame(), path_begin..path_end, turn) {
+            // Behind the main paths of all lines, in front of what echoes there.
+            if converges && round.role == ROLE_BRANCHES {
+                self.run(cmd, &APERTURE)?;
+                cmd.scope("trace");
+                converges = false;
+            }
             let threads = Extent::Threads(round.threads());
             let push = bytemuck::cast_slice(&round.push);
             self.record(cmd, &TRACE[round.role as usize], threads, push, &|_| Vec::new())?;
@@ -235,6 +247,11 @@ impl Passes {
         let mut prescan = "prescan";
         if fusion.background_shadows {
             self.run(cmd, &SHADOW)?;
+            if self.loses_by_aperture() {
+                self.run_with(cmd, &APERTURE, &|lane| {
+                    vec![("apertures", &lane.buffers["shades"])]
+                })?;
+            }
             self.run(cmd, &DARKEN)?;
             prescan = "shaded";
         }

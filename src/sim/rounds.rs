@@ -64,8 +64,9 @@ pub struct Round {
     /// The role of its paths: [`ROLE_WHOLE`], [`ROLE_MAIN`] or [`ROLE_BRANCHES`].
     pub role: u32,
     /// Push constants: first path, number of paths, first line, number of lines, pieces of work, most pieces that a
-    /// worker may take, which of two counters deals them out, paths in a block, and workers of a work group.
-    pub push: [u32; 9],
+    /// worker may take, which of two counters deals them out, paths in a block, workers of a work group, and 1 where main
+    /// paths are followed once more.
+    pub push: [u32; 10],
     /// Number of workers. Each takes one piece after the other, so that no thread waits for the longer path of
     /// another one.
     pub workers: u32,
@@ -74,7 +75,7 @@ pub struct Round {
 impl Round {
     /// The size of its dispatch: all threads of the work groups in which the workers are.
     pub fn threads(&self) -> [u32; 3] {
-        let [.., lanes] = self.push;
+        let [.., lanes, _] = self.push;
         [self.workers.div_ceil(lanes) * TRACE_GROUP, 1, 1]
     }
 
@@ -97,8 +98,8 @@ pub struct Rounds {
 
 impl Rounds {
     /// The rounds for batches of up to `paths` paths per line, on a device that runs about `at_once` threads at
-    /// once. Only as many lines are traced together as give each of these threads a main path, so that a device
-    /// with few threads stores few interactions.
+    /// once. Where paths do not begin alike, only as many lines are traced together as give each of these threads a main path,
+    /// so that a device with few threads stores few interactions.
     pub fn new(frame: &Frame, paths: u32, at_once: u32) -> Self {
         let lines = frame.scanlines * frame.layers;
         let mains = match frame.sampling {
@@ -109,7 +110,11 @@ impl Rounds {
         let line_bytes = path_bytes(frame) * u64::from(mains);
         let affordable = INTERACTION_BUDGET.checked_div(line_bytes);
         let affordable = affordable.map_or(u32::MAX, |n| u32::try_from(n).unwrap_or(u32::MAX));
-        let useful = at_once.checked_div(mains).unwrap_or(u32::MAX);
+        let useful = match one_speaks_for_all(frame) {
+            // What the main paths of all lines lose is known before any of them echoes.
+            true => u32::MAX,
+            false => at_once.checked_div(mains).unwrap_or(u32::MAX),
+        };
         let together = affordable.min(useful).clamp(1, lines.max(1));
         Self {
             // The lines in groups of equal size.
@@ -121,7 +126,7 @@ impl Rounds {
     }
 
     /// The same, but with no more lines together than there is room for their main paths.
-    pub(super) fn within(self, main_paths: u64) -> Self {
+    pub fn within(self, main_paths: u64) -> Self {
         let room = main_paths.checked_div(self.mains.into()).unwrap_or(u64::MAX);
         Self { lines: self.lines.min(u32::try_from(room).unwrap_or(u32::MAX)).max(1), ..self }
     }
@@ -163,7 +168,7 @@ impl Rounds {
         let (begin, count) = (paths.start, paths.len() as u32);
         let alike = one_speaks_for_all(frame);
         let block = if alike { self.block(count) } else { 1 };
-        let mut round = |role, count, line, lines: u32, per_line: u32| {
+        let mut round = |role, count, line, lines: u32, per_line: u32, again| {
             let pieces = lines * per_line;
             let workers = self.at_once.max(pieces / PIECES);
             let workers = workers.min(pieces).clamp(1, MOST_WORKERS);
@@ -172,20 +177,27 @@ impl Rounds {
             let most = 2 * pieces.div_ceil(workers);
             let few = workers * (TRACE_GROUP / FEW_LANES) <= self.at_once;
             let lanes = if few { FEW_LANES } else { TRACE_GROUP };
-            let push = [begin, count, line, lines, pieces, most, *turn, block, lanes];
+            let push = [begin, count, line, lines, pieces, most, *turn, block, lanes, again];
             *turn ^= 1;
             Round { role, push, workers }
         };
         if self.mains == 0 {
-            return vec![round(ROLE_WHOLE, count, 0, all, count)];
+            return vec![round(ROLE_WHOLE, count, 0, all, count, 0)];
         }
         let (mains, blocks) = if alike { (1, count.div_ceil(block)) } else { (count, 1) };
         let mut rounds = Vec::new();
-        for first in (0..all).step_by(self.lines as usize) {
-            let lines = self.lines.min(all - first);
-            rounds.push(round(ROLE_MAIN, mains, first, lines, mains));
+        let groups = || (0..all).step_by(self.lines as usize);
+        let lines = |first| self.lines.min(all - first);
+        // Where there is no room for the interactions of all lines, their main paths are followed twice.
+        let ahead = alike && groups().len() > 1;
+        if ahead {
+            rounds.extend(groups().map(|first| round(ROLE_MAIN, 1, first, lines(first), 1, 0)));
+        }
+        for first in groups() {
+            let again = u32::from(ahead);
+            rounds.push(round(ROLE_MAIN, mains, first, lines(first), mains, again));
             let met = mains * self.slots * blocks;
-            rounds.push(round(ROLE_BRANCHES, mains, first, lines, met));
+            rounds.push(round(ROLE_BRANCHES, mains, first, lines(first), met, 0));
         }
         rounds
     }
@@ -230,9 +242,14 @@ mod tests {
             let rounds = Rounds::new(&frame, paths, 1 << 18);
             assert!(rounds.interactions() * size_of::<Interaction>() as u64 <= INTERACTION_BUDGET);
             let taken = rounds.of(&frame, 0..paths, &mut 0);
-            for role in [ROLE_MAIN, ROLE_BRANCHES] {
-                assert_eq!(lines(&taken, role), [1; 192 * 7]);
-            }
+            assert_eq!(lines(&taken, ROLE_BRANCHES), [1; 192 * 7]);
+            // Main paths that are alike are followed twice where there is no room for all of their interactions.
+            let (first, again): (Vec<_>, Vec<_>) =
+                taken.iter().filter(|r| r.role == ROLE_MAIN).partition(|r| r.push[9] == 0);
+            let [first, again] =
+                [first, again].map(|rounds| rounds.into_iter().copied().collect::<Vec<_>>());
+            assert_eq!(lines(&first, ROLE_MAIN), [1; 192 * 7]);
+            assert!(again.is_empty() || lines(&again, ROLE_MAIN) == [1; 192 * 7]);
             let most = |rounds: &[Round]| rounds.iter().map(|r| r.threads()[0]).max();
             assert!(most(&taken) <= Some(TRACE_GROUP * MOST_GROUPS));
             // If one main path serves all paths, one batch holds all paths.
@@ -243,8 +260,9 @@ mod tests {
             assert!(
                 taken.iter().zip([0, 1].into_iter().cycle()).all(|(r, turn)| r.push[6] == turn)
             );
-            // Main paths come before their branches.
-            let roles: Vec<u32> = taken.iter().map(|r| r.role).collect();
+            // Main paths come before their branches; those that are alike all before any branches.
+            let ahead = if again.is_empty() { 0 } else { first.len() };
+            let roles: Vec<u32> = taken[ahead..].iter().map(|r| r.role).collect();
             assert!(roles.chunks(2).all(|r| r == [ROLE_MAIN, ROLE_BRANCHES]));
         }
     }
@@ -267,28 +285,33 @@ mod tests {
 
     #[test]
     fn a_device_of_few_threads_traces_groups_of_lines_one_after_the_other() {
+        // Those that are alike are traced together on every device, if there is room.
         let frame = frame(8, 32);
-        let few = Rounds::new(&frame, 8, 512);
+        assert_eq!(Rounds::new(&frame, 8, 512).main_paths(), 1344);
+        let few = Rounds::new(&frame, 8, 512).within(448);
         assert_eq!(few.main_paths(), 448);
         let taken = few.of(&frame, 0..8, &mut 0);
-        assert_eq!(taken.len(), 6);
+        assert_eq!(
+            taken.iter().map(|r| r.push[9]).collect::<Vec<_>>(),
+            [0, 0, 0, 1, 0, 1, 0, 1, 0]
+        );
         // Main paths of a large GPU are in groups of their own; here all threads of a group are needed.
         let large = Rounds::new(&frame, 8, 1 << 18).of(&frame, 0..8, &mut 0);
         assert_eq!(large.iter().map(|r| r.push[8]).collect::<Vec<_>>(), [FEW_LANES, TRACE_GROUP]);
         assert_eq!(large[0].threads(), [8 * 1344, 1, 1]);
         assert_eq!(taken[0].push[8], TRACE_GROUP);
         // Few threads: as many paths at an interaction as a block takes.
-        assert_eq!(taken[1].push[7], MOST_IN_BLOCK);
-        assert_eq!(taken[1].push[4], 448 * 32);
-        for role in [ROLE_MAIN, ROLE_BRANCHES] {
-            assert_eq!(lines(&taken, role), [1; 192 * 7]);
-        }
-        // A frame of 51 lines of one path would trace them together, but there is room for two groups of 100.
-        let [hundred, fewer] = [100, 51].map(|scanlines| Frame { scanlines, layers: 1, ..frame });
+        assert_eq!(taken[4].push[7], MOST_IN_BLOCK);
+        assert_eq!(taken[4].push[4], 448 * 32);
+        assert_eq!(lines(&taken, ROLE_BRANCHES), [1; 192 * 7]);
+        assert_eq!(lines(&taken, ROLE_MAIN), [2; 192 * 7]);
+        // A frame of 51 lines of one path of their own would trace them together, but there is room for two groups of 100.
+        let own = Frame { flags: FLAG_ROUGH_TRANSMISSION, ..frame };
+        let [hundred, fewer] = [100, 51].map(|scanlines| Frame { scanlines, layers: 1, ..own });
         let room = Rounds::new(&hundred, 1, 51).main_paths();
         assert_eq!((room, Rounds::new(&fewer, 1, 51).main_paths()), (50, 51));
         assert_eq!(Rounds::new(&fewer, 1, 51).within(room).main_paths(), 50);
         // Even for 0 threads at once, one line is traced.
-        assert_eq!(Rounds::new(&frame, 8, 0).main_paths(), 1);
+        assert_eq!(Rounds::new(&own, 8, 0).main_paths(), 8);
     }
 }

@@ -2,6 +2,7 @@
 
 use super::pass::{Array, Pass};
 use crate::scene::Scene;
+pub use aperture::APERTURE;
 pub use axial::AXIAL;
 pub use beam::BEAM;
 pub use blur::BLUR;
@@ -21,6 +22,7 @@ pub use shadow::{DARKEN, SHADOW};
 pub use tint::TINT;
 pub use trace::TRACE;
 
+mod aperture;
 mod axial;
 mod beam;
 pub mod blur;
@@ -41,8 +43,8 @@ pub(super) mod tint;
 mod trace;
 
 /// Stages of every frame, in order.
-pub const IMAGE: [&Pass; 8] =
-    [&ORIGIN, &TRACE[0], &TRACE[1], &TRACE[2], &SCATTER, &BEAM, &AXIAL, &DISPLAY];
+pub const IMAGE: [&Pass; 9] =
+    [&ORIGIN, &TRACE[0], &TRACE[1], &APERTURE, &TRACE[2], &SCATTER, &BEAM, &AXIAL, &DISPLAY];
 
 /// Stages of frames that have labels, in order; the first after each [`SCATTER`].
 pub const LABELS: [&Pass; 4] = [&EXPECT, &LABEL, &LEVEL, &CHART];

@@ -89,6 +89,7 @@ fn constants(
             | flag(scene.is_masked(), layout::FLAG_MASKED)
             | flag(simulation.beam_footprint, layout::FLAG_FOOTPRINT)
             | flag(simulation.refraction == Refraction::Beam, layout::FLAG_WAVEFRONT)
+            | flag(simulation.loses_by_aperture(), layout::FLAG_APERTURE)
             | flag(simulation.sequence == Sequence::Sobol, layout::FLAG_SOBOL),
         seed: simulation.seed,
         origin_jitter: simulation.origin_jitter as f32,
@@ -115,6 +116,7 @@ fn constants(
         pixel_pitch: pixel_pitch as f32,
         image_left: (-f64::from(image_width) * pixel_pitch / 2.0) as f32,
         image_top: top as f32,
+        echo_lines: probe.scanlines,
         ..layout::Frame::default()
     }
 }
@@ -238,7 +240,8 @@ pub fn rows(scene: &Scene) -> Vec<layout::Row> {
                 strip_lines: strip.smoothing as f32,
                 strip_core: strip.core as f32,
                 lobe: scene.probe.lobe(z) as f32,
-                ..layout::Row::default()
+                transmit_half: (scene.probe.converging_aperture(z) / 2.0) as f32,
+                receive_half: (scene.probe.receive_aperture(z) / 2.0) as f32,
             }
         })
         .collect()

@@ -94,7 +94,10 @@ fn reached(way: &[(DVec2, f64)], power: f64) -> DVec2 {
     before.0.lerp(after.0, (power - before.1) / (after.1 - before.1))
 }
 
-/// Nine images of the fetus as it lies, and the scene that they show.
+/// Images of a lie: by speckle alone one of them is off by some percent.
+const IMAGES: u32 = 25;
+
+/// Images of the fetus as it lies, each with other speckle.
 fn pictures(lie: &Lie) -> Vec<Picture> {
     let mut world_from_probe = scene("fetus.toml", &[]).world_from_probe;
     if lie.across {
@@ -117,7 +120,7 @@ fn pictures(lie: &Lie) -> Vec<Picture> {
     (imaging.grey_map, imaging.gain, imaging.dynamic_range) = (GreyMap::Linear, 16.0, 60.0);
     let mut simulator =
         Simulator::new(&test_device(), &Library::embedded(), &scene, Tracer::Bvh).expect("made");
-    let shots = [1, 2, 3, 4, 5, 6, 7, 8, 9].map(|seed| Shot { seed, ..Shot::of(&scene, 0) });
+    let shots: Vec<Shot> = (1..=IMAGES).map(|seed| Shot { seed, ..Shot::of(&scene, 0) }).collect();
     simulator.frames(&scene, &shots).expect("no device error");
     let frame = *simulator.constants();
     let pitch = f64::from(frame.pixel_pitch);

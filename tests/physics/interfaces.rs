@@ -3,6 +3,7 @@
 use glam::{DAffine3, DVec3};
 use insonify::probe::Kind;
 use insonify::scene::{Scene, Tissue};
+use insonify::settings::Loss;
 use insonify::sim::Tracer;
 use insonify_tools::reference::Segment;
 
@@ -27,8 +28,9 @@ const PAIRS: [[usize; 2]; 6] = [[0, 1], [1, 2], [2, 3], [1, 4], [4, 0], [3, 5]];
 /// One scanline that meets a wall turned by `tilt` rad at 40 mm.
 fn wall(before: [f64; 2], behind: [f64; 2], tilt: f64) -> Scene {
     let mut scene = linear(1, 1.0, tissue(before[0], before[1], 0.0));
-    // Near total reflection, and into air, little goes through.
+    // Near total reflection, and into air, little goes through; a path that others of the aperture may light never ends.
     scene.simulation.min_weight = 1e-12;
+    scene.simulation.loss = Loss::Ray;
     let place = DAffine3::from_translation(DVec3::new(0.0, 0.0, 40.0));
     // The middle of the face is on an edge between two triangles: move it aside, along the wall.
     let at = place

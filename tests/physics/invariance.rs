@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use glam::{DAffine3, DQuat, DVec3};
 use insonify::scene::Scene;
-use insonify::settings::Sampling;
+use insonify::settings::{Loss, Sampling};
 
 use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};
 use crate::moments::{decibel, mean};
@@ -117,6 +117,8 @@ fn schemes(bench: &Bench, physics: Physics) -> Outcome {
         let frames = SCHEMES.map(|(sampling, _)| {
             let mut scene = turned_aside(if physics == Physics::Planted { 1.1 * r } else { r });
             scene.simulation.sampling = sampling;
+            // Independent paths know no aperture.
+            scene.simulation.loss = Loss::Ray;
             let frame = render(&scene);
             (scene, frame)
         });

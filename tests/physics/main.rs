@@ -28,6 +28,7 @@ mod moments;
 #[path = "../../tools/validate/page.rs"]
 mod page;
 mod paths;
+mod penumbra;
 mod pictures;
 mod profile;
 mod refraction;

@@ -4,7 +4,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 use glam::{DAffine3, DVec3};
 use insonify::scene::{Instance, Keyframes, Mesh, Scene, Tissue};
-use insonify::settings::Refraction;
+use insonify::settings::{Loss, Refraction};
 use insonify_tools::reference::Segment;
 
 use crate::check::{Bench, Check, Curve, Outcome, Physics, Picture, Plot};
@@ -46,6 +46,7 @@ fn cylinder(lines: u32, [from, to]: [f64; 2], around: Tissue, inside: Tissue) ->
     scene.world_from_probe = DAffine3::from_translation(DVec3::new((from + to) / 2.0, 0.0, 0.0));
     scene.probe.depth = 60.0;
     scene.simulation.min_weight = 1e-12;
+    scene.simulation.loss = Loss::Ray;
     scene.meshes.push(tube().into());
     scene.instances.push(Instance {
         name: "cylinder".into(),

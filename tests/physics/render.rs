@@ -43,6 +43,7 @@ impl Inputs {
             };
             inputs.place(&mesh.positions, &mesh.normals, &mesh.triangles, instance);
         }
+        inputs.converge();
         Self(inputs)
     }
 }

@@ -76,6 +76,7 @@ rows! {
     apertures::points_are_as_wide_as_through_real_apertures,
     full_wave::a_slab_echoes_as_in_a_full_wave_simulation,
     full_wave::a_cylinder_shadows_as_in_a_full_wave_simulation,
+    penumbra::the_edge_of_a_shadow_is_as_wide_as_the_aperture_makes_it,
 }
 
 #[test]

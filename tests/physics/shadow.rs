@@ -1,6 +1,7 @@
 //! Brightness behind structures: enhancement under fluid, shadow under bone.
 
 use glam::{DAffine3, DVec3};
+use insonify::settings::Loss;
 
 use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};
 use crate::contrast::region;
@@ -60,6 +61,8 @@ fn enhancement(bench: &Bench, physics: Physics) -> Outcome {
     let mut plain = homogeneous(LINES, 0.7, 1);
     plain.imaging.tgc_attenuation = TISSUE;
     plain.tissues[0].attenuation = TISSUE * loss;
+    // Along each line alone; apertures mix what lies behind the sphere with what lies beside it.
+    plain.simulation.loss = Loss::Ray;
     let mut scene = plain.clone();
     let fluid = silent(1.540, inside, FLUID * loss);
     add_sphere(&mut scene, RADIUS, fluid, DVec3::new(0.0, 0.0, CENTRE));
@@ -130,6 +133,8 @@ fn bone_shadow(bench: &Bench, physics: Physics) -> Outcome {
         let mut dots = Vec::new();
         for thickness in [1.0, 3.0] {
             let mut scene = homogeneous(64, 1.0, 1);
+            // The penumbra is another check's.
+            scene.simulation.loss = Loss::Ray;
             scene.tissues[0].density = soft / scene.tissues[0].speed;
             let at = DAffine3::from_translation(DVec3::new(25.0, 5.3, 30.0));
             add_box(&mut scene, [50.0, 50.0, thickness], silent(3.515, hard, 5.0), at);

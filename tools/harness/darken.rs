@@ -3,8 +3,9 @@
 use super::inputs::{Random, frame, lines, samples};
 use super::shadow::unpack;
 use super::{Case, Check, Input, Job, Size, Subject};
+use super::{aperture, trace};
 use crate::reference::darken;
-use insonify::sim::layout::{FAR_PIECE, Frame, MAX_PIECES};
+use insonify::sim::layout::{FAR_PIECE, FLAG_APERTURE, Frame, MAX_PIECES};
 use insonify::sim::stages;
 
 pub const SUBJECT: Subject = Subject {
@@ -21,7 +22,10 @@ pub const SUBJECT: Subject = Subject {
 };
 
 fn job(case: Case, size: Size) -> Job {
-    let frame = frame(case, size);
+    let mut frame = frame(case, size);
+    if case == Case::Random {
+        frame.flags |= FLAG_APERTURE;
+    }
     let mut random = Random(14);
     let mut pieces = Vec::new();
     for _ in 0..lines(&frame) {
@@ -62,6 +66,7 @@ fn job(case: Case, size: Size) -> Job {
         Input::words("frame", &[frame]),
         Input::floats("pieces", pieces.as_flattened()),
         Input::floats("prescan", &prescan),
+        Input { name: "shades", ..trace::apertures(&frame, &aperture::losses(&frame)) },
     ];
     Job::of(&stages::DARKEN, given, Vec::new())
 }
@@ -70,12 +75,13 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     let frame: Frame = job.one("frame");
     let lines = unpack(&job.get::<[f32; 4]>("pieces"));
     let prescan: Vec<[f32; 2]> = job.get("prescan");
+    let shades: Vec<[f32; 2]> = job.get("shades");
     let got: Vec<f32> = job.after(outputs, "shaded");
     let mut expected = Vec::new();
     for l in 0..frame.scanlines {
         for k in 0..frame.samples {
             let [mask, grey] = prescan[(l * frame.samples + k) as usize];
-            let left = darken::transmitted(&frame, &lines, l, k);
+            let left = darken::transmitted(&frame, &lines, &shades, l, k);
             expected.extend([mask.into(), darken::level_behind(&frame, grey, left)]);
         }
     }

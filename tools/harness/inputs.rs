@@ -112,6 +112,7 @@ pub fn frame(case: Case, size: Size) -> Frame {
         // The odd case makes some of the face's scanlines.
         first_line: if case == Case::Odd { 3 } else { 0 },
         lines_beside: if case == Case::Odd { 9 } else { 0 },
+        echo_lines: scanlines,
         image_width: 1,
         image_height: 1,
         pixel_pitch: 0.25,
@@ -153,6 +154,8 @@ pub fn rows(frame: &Frame) -> Vec<Row> {
                 // Narrow beams at every eighth sample.
                 strip_core: if k % 8 == 5 { -1.0 } else { 0.8 - 0.01 * depth },
                 lobe: 10.0 + 0.2 * depth,
+                transmit_half: (0.21 * depth).min(7.13),
+                receive_half: 0.173 * depth,
                 ..Row::default()
             }
         })

@@ -4,12 +4,12 @@ use glam::{DAffine3, DQuat, DVec3};
 
 use super::beam::contact;
 use super::inputs::{Random, rows, scanlines, straight_frame};
-use super::worlds;
 use super::{Case, Check, Input, Job, Size, Subject};
+use super::{aperture, trace, worlds};
 use crate::reference::label::{self, Past, Seen, label};
 use insonify::sim::layout::{
-    FLAG_COINCIDENT, FLAG_FOOTPRINT, FLAG_MASKED, FLAG_WAVEFRONT, Frame, Instance, Label, NONE,
-    Surface,
+    FLAG_APERTURE, FLAG_COINCIDENT, FLAG_FOOTPRINT, FLAG_MASKED, FLAG_WAVEFRONT, Frame, Instance,
+    Label, NONE, Surface,
 };
 use insonify::sim::placement::matrix_rows;
 use insonify::sim::stages;
@@ -40,7 +40,7 @@ pub const SUBJECT: Subject = Subject {
 fn job(case: Case, size: Size) -> Job {
     let mut frame = straight_frame(case, size);
     frame.flags |= match case {
-        Case::Random => FLAG_FOOTPRINT | FLAG_WAVEFRONT,
+        Case::Random => FLAG_FOOTPRINT | FLAG_WAVEFRONT | FLAG_APERTURE,
         Case::Odd => FLAG_MASKED,
         Case::Modes => FLAG_COINCIDENT,
         _ => 0,
@@ -86,6 +86,7 @@ fn job(case: Case, size: Size) -> Job {
         Input::words("instances_before", &instances),
         Input::floats("fields_before", &values),
     ]);
+    inputs.push(trace::apertures(&frame, &aperture::losses(&frame)));
     Job::of(&stages::LABEL, inputs, Vec::new())
 }
 

@@ -4,7 +4,7 @@ use super::check::relative_norm;
 use super::inputs::{Random, lines, rows, scanlines};
 use super::{Case, Check, Extent, Input, Job, Size, Subject, trace, worlds};
 use crate::reference::{Segment, origin, scatter};
-use insonify::sim::layout::{self, Counters, FLAG_VOXEL, Frame};
+use insonify::sim::layout::{self, APERTURE_BANDS, Counters, FLAG_VOXEL, Frame};
 use insonify::sim::stages;
 use insonify::sim::tables::with_spheres;
 
@@ -34,9 +34,12 @@ pub const RIGID: Subject = Subject {
     ..Subject::of(&stages::SCATTER)
 };
 
-/// Segments found by the twin of `trace`, in the device's slots.
-pub(super) fn segments(job: &Job, frame: &Frame) -> (Vec<layout::Segment>, Vec<u32>) {
-    let owned = worlds::owned(job);
+/// Segments found by the twin of `trace`, in the device's slots, with the table of what main paths lose.
+pub(super) fn segments(job: &Job, frame: &Frame) -> (Vec<layout::Segment>, Vec<u32>, Input) {
+    let mut owned = worlds::owned(job);
+    let nodes = frame.scanlines * frame.layers * (APERTURE_BANDS + 1);
+    // Branches are as faint as they may be.
+    owned.apertures = vec![[0.0; 2]; nodes as usize];
     let mut world = owned.world();
     let rows = rows(frame);
     world.rows = &rows;
@@ -51,7 +54,8 @@ pub(super) fn segments(job: &Job, frame: &Frame) -> (Vec<layout::Segment>, Vec<u
         }
         counts.push(found.len().min(capacity) as u32);
     }
-    (slots, counts)
+    let lost = if traced.lost.is_empty() { vec![0.0; nodes as usize] } else { traced.lost };
+    (slots, counts, trace::apertures(frame, &lost))
 }
 
 fn job(case: Case, size: Size) -> Job {
@@ -102,7 +106,7 @@ fn job_of(mut job: Job, case: Case) -> Job {
         frame.flags |= FLAG_VOXEL;
     }
     job.inputs[0] = Input::words("frame", &[frame]);
-    let (mut segments, counts) = segments(&job, &frame);
+    let (mut segments, counts, apertures) = segments(&job, &frame);
     if case == Case::NotFinite {
         spoil(&mut segments, &counts, frame.segment_capacity as usize);
     }
@@ -114,6 +118,7 @@ fn job_of(mut job: Job, case: Case) -> Job {
         Input::words("segments", &segments),
         Input::words("segment_count", &counts),
         scanlines(&frame),
+        apertures,
     ]);
     Job::of(&stages::SCATTER, given, Vec::new())
 }

@@ -3,11 +3,13 @@
 use super::inputs::{frame, rows, scanlines};
 use super::worlds;
 use super::{Case, Check, Input, Job, Size, Subject};
+use crate::reference::aperture::{self, loses_by_aperture};
+use crate::reference::darken;
 use crate::reference::origin;
 use crate::reference::shadow::{self, Piece};
 use insonify::sim::layout::{
-    FAR_PIECE, FLAG_COINCIDENT, FLAG_FOOTPRINT, FLAG_MASKED, FLAG_WAVEFRONT, MAX_PIECES,
-    START_WORDS, Surface,
+    APERTURE_BANDS, FAR_PIECE, FLAG_APERTURE, FLAG_COINCIDENT, FLAG_FOOTPRINT, FLAG_MASKED,
+    FLAG_WAVEFRONT, MAX_PIECES, START_WORDS, Surface,
 };
 use insonify::sim::stages;
 
@@ -38,7 +40,7 @@ pub const SUBJECT: Subject = Subject {
 fn job(case: Case, size: Size) -> Job {
     let mut frame = frame(case, size);
     frame.flags = match case {
-        Case::Random => FLAG_MASKED | FLAG_FOOTPRINT | FLAG_WAVEFRONT,
+        Case::Random => FLAG_MASKED | FLAG_FOOTPRINT | FLAG_WAVEFRONT | FLAG_APERTURE,
         Case::Odd => FLAG_MASKED,
         Case::Modes => FLAG_COINCIDENT,
         _ => 0,
@@ -106,10 +108,22 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     };
     let wrong = got.iter().zip(&twin).filter(|(got, twin)| !alike(got, twin));
     let wrong = wrong.count();
+    // What is lost at the nodes is what the pieces say.
+    let shades: Vec<[f32; 2]> = job.after(outputs, "shades");
+    let lines = frame.layers * frame.scanlines;
+    let nodes = (0..lines).flat_map(|line| (0..=APERTURE_BANDS).map(move |node| [line, node]));
+    let otherwise = |&[line, node]: &[u32; 2]| {
+        let kappa = f64::from(node) * f64::from(frame.samples) / f64::from(APERTURE_BANDS);
+        let expected = darken::lost(shadow::level(&got[line as usize], kappa));
+        let lost = f64::from(shades[aperture::place(&frame, line, node)][1]);
+        !((lost - expected).abs() < 1e-4 || lost.is_nan() && expected.is_nan())
+    };
+    let lost = nodes.filter(|at| loses_by_aperture(&frame) && otherwise(at)).count();
     // Otherwise nothing would be compared.
     let flat = twin.iter().filter(|p| p.len() < 3).count();
     vec![
         Check::count("lines", twin.len(), wrong, twin.len() / 60),
+        Check::count("losses at nodes", got.len(), lost, got.len() / 60),
         Check::equal("number of lines", &[got.len()], &[twin.len()]),
         Check::count(
             "lines that meet nothing",

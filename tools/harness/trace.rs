@@ -1,14 +1,15 @@
 //! `trace`: paths, their surface echoes and their segments.
 
 use super::check::relative_norm;
-use super::inputs::{frame, lines, rows, scanlines};
+use super::inputs::{Random, frame, lines, rows, scanlines};
 use super::worlds;
 use super::{Case, Check, Extent, Input, Job, Size, Subject};
 use crate::reference::{Segment, origin, trace};
 use insonify::sim::layout::{
-    self, Counters, FLAG_COHERENT, FLAG_COINCIDENT, FLAG_FACE_REFLECTION, FLAG_FOOTPRINT,
-    FLAG_MASKED, FLAG_ROUGH_TRANSMISSION, FLAG_SOBOL, FLAG_WAVEFRONT, FLAG_WORLD_TEXTURE, Frame,
-    SAMPLING_MAIN_PATH, SAMPLING_PLAIN, SAMPLING_SHARED_PRIMARY, START_WORDS,
+    self, APERTURE_BANDS, Counters, FLAG_APERTURE, FLAG_COHERENT, FLAG_COINCIDENT,
+    FLAG_FACE_REFLECTION, FLAG_FOOTPRINT, FLAG_MASKED, FLAG_ROUGH_TRANSMISSION, FLAG_SOBOL,
+    FLAG_WAVEFRONT, FLAG_WORLD_TEXTURE, Frame, SAMPLING_MAIN_PATH, SAMPLING_PLAIN,
+    SAMPLING_SHARED_PRIMARY, START_WORDS,
 };
 use insonify::sim::rounds::Rounds;
 use insonify::sim::stages;
@@ -50,7 +51,8 @@ pub fn rounds(job: &Job, frame: &Frame) -> Rounds {
         // The job of another kernel, whose push constants are different.
         Err(_) => frame.paths,
     };
-    Rounds::new(frame, paths, WORKERS)
+    // Main paths that begin alike, too, in several groups.
+    Rounds::new(frame, paths, WORKERS).within(WORKERS.into())
 }
 
 /// Frame, tissues, surfaces, the world's six bindings, and its fields.
@@ -71,6 +73,12 @@ pub fn scene(case: Case, size: Size) -> Vec<Input> {
         ),
         // Main paths of their own.
         Case::One => (SAMPLING_MAIN_PATH, FLAG_ROUGH_TRANSMISSION, 3),
+        // One main path of each line for all of them, that loses by the aperture.
+        Case::Random => {
+            (frame.origin_jitter, frame.emission_lobe) = (0.0, 0.0);
+            let flags = FLAG_FOOTPRINT | FLAG_SOBOL | FLAG_WAVEFRONT | FLAG_APERTURE;
+            (SAMPLING_MAIN_PATH, flags, 8)
+        }
         _ => (SAMPLING_MAIN_PATH, FLAG_FOOTPRINT | FLAG_SOBOL | FLAG_WAVEFRONT, 8),
     };
     let mut tissues = worlds::tissues();
@@ -94,6 +102,18 @@ pub fn scene(case: Case, size: Size) -> Vec<Input> {
     inputs
 }
 
+/// Nodes of depth of all lines.
+fn nodes(frame: &Frame) -> usize {
+    lines(frame) * (APERTURE_BANDS as usize + 1)
+}
+
+/// Factors by the aperture, of any size, beside these losses.
+pub(super) fn apertures(frame: &Frame, lost: &[f64]) -> Input {
+    let gains = Random(17).floats(nodes(frame), -0.7, 0.7);
+    let table: Vec<[f32; 2]> = gains.iter().zip(lost).map(|(g, lost)| [*g, *lost as f32]).collect();
+    Input::floats("apertures", table.as_flattened())
+}
+
 fn job(case: Case, size: Size) -> Job {
     let mut job = Job { inputs: scene(case, size), push: Vec::new() };
     let frame: Frame = job.one("frame");
@@ -109,6 +129,7 @@ fn job(case: Case, size: Size) -> Job {
         Input::words("stacks", &origin::pack(&stacks)),
         Input::floats("rows", bytemuck::cast_slice(&rows)),
         scanlines(&frame),
+        apertures(&frame, &vec![0.0; nodes(&frame)]),
     ]);
     let push = bytemuck::bytes_of(&[0, frame.paths]).to_vec();
     Job::of(&stages::TRACE[0], job.inputs, push)
@@ -140,9 +161,17 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     let paths = lines(frame) * frame.paths as usize;
     let spare = 4 * (paths / 400);
     let interactions = counters.interactions.abs_diff(twin.counters.interactions) as usize;
+    let table: Vec<[f32; 2]> = job.after(outputs, "apertures");
+    let otherwise = |(node, lost): &(&[f32; 2], &f64)| {
+        let error = (f64::from(node[1]) - **lost).abs();
+        // NaN, too, is an error.
+        !(error < 1e-3 + 1e-3 * lost.abs())
+    };
+    let lost_otherwise = table.iter().zip(&twin.lost).filter(otherwise).count();
     let kept = |c: &Counters| [c.paths_lost, c.stack_overflow, c.segments_dropped];
     let limited = counters.strips_limited.abs_diff(twin.counters.strips_limited) as usize;
     vec![
+        Check::count("losses", twin.lost.len(), lost_otherwise, twin.lost.len() / 100),
         Check::count("strips limited", total, limited, spare),
         Check::count("segments", total, missing, spare),
         Check::one("echo norm", relative_norm(&echoes, &fixed), 2e-3),

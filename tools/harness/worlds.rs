@@ -258,6 +258,7 @@ pub fn owned(job: &Job) -> Owned {
         triangles: job.optional("triangles"),
         points,
         fields: fields(job),
+        apertures: job.optional("apertures"),
     }
 }
 

@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::aperture::{loses_by_aperture, nepers};
 use super::beam::coupling;
 use super::field::Field;
 use super::geometry::world_line;
@@ -81,8 +82,21 @@ impl Labels {
         let (tissue, instance) = world.medium(&way.path.stack);
         let instance = if instance == frame.couplant { NONE } else { instance };
         let place = way.path.origin + x * way.path.direction;
-        let left = way.path.weight * (-way.absorption * x).exp();
-        Some(Seen { tissue, instance, place, loss: -20.0 * left.log10() })
+        let mut lost = way.absorption * x - way.path.weight.ln();
+        if loses_by_aperture(frame) {
+            let table = |at: usize| world.apertures[at].map(f64::from);
+            let time = k * f64::from(frame.sample_pitch) / f64::from(frame.speed);
+            // The layers beside the middle of the slice.
+            let beside = [(frame.layers - 1) / 2, frame.layers / 2].map(|layer| {
+                let line = layer * frame.scanlines + way.path.line;
+                nepers(frame, table, line, time, lost)
+            });
+            lost -= (beside[0] + beside[1]) / 2.0;
+            if lost > -f64::from(frame.min_weight).ln() {
+                return None;
+            }
+        }
+        Some(Seen { tissue, instance, place, loss: lost * 20.0 / std::f64::consts::LN_10 })
     }
 
     /// Angle from the normal of the first surface that the main path meets in sample `k`, degrees.
@@ -142,7 +156,7 @@ pub fn label(world: &World) -> Vec<Labels> {
             let ways = ways(world, path, |path, count| {
                 count + 1 == MAX_WAYS
                     || path.interactions >= frame.max_interactions
-                    || path.weight < f64::from(frame.min_weight)
+                    || !loses_by_aperture(frame) && path.weight < f64::from(frame.min_weight)
             });
             let begins = ways.iter().map(|way| sample(frame, &way.path)).collect();
             Labels { crossings, around, ways, begins }

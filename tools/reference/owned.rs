@@ -1,7 +1,7 @@
 //! A world with arrays of its own, for the twins.
 
 use super::world::{Geometry, World, affine};
-use super::{origin, trace};
+use super::{aperture, origin, trace};
 use insonify::scene::Mesh;
 use insonify::scene::smoothed::{FINEST, smoothed};
 use insonify::sim::layout::{Frame, Instance, Row, Surface, Tissue};
@@ -31,6 +31,8 @@ pub struct Owned {
     pub triangles: Vec<[u32; 3]>,
     /// Displacement fields, in vectors.
     pub fields: Vec<[f32; 3]>,
+    /// Factors by the aperture and losses ([`World::apertures`]).
+    pub apertures: Vec<[f32; 2]>,
 }
 
 impl Owned {
@@ -79,7 +81,17 @@ impl Owned {
             },
             points: &self.points,
             fields: &self.fields,
+            apertures: &self.apertures,
         }
+    }
+
+    /// Computes what the main paths lose, and the factors by the aperture; nothing where losses do not count by it.
+    pub fn converge(&mut self) {
+        let world = self.world();
+        let lost = trace::losses(&world, &origin::origin(&world).0);
+        let gains = aperture::aperture(&self.frame, &self.rows, &lost);
+        let nodes = gains.iter().zip(&lost);
+        self.apertures = nodes.map(|(gain, lost)| [*gain as f32, *lost as f32]).collect();
     }
 
     /// Segments per line and surface echoes; every line starts inside the media that enclose its origin.

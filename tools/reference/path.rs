@@ -55,6 +55,8 @@ pub(super) struct Path {
     pub(super) survival: f64,
     pub(super) stack: Stack,
     pub(super) t_min: f64,
+    /// True for a main path behind a surface that lets hardly anything through.
+    pub(super) shadowed: bool,
 }
 
 impl Path {

@@ -6,6 +6,7 @@ mod others;
 
 use glam::{DAffine3, DVec3};
 
+use super::aperture::{loses_by_aperture, lost_of, nepers};
 use super::field::Field;
 use super::geometry::{beam_weight, line_pitch, probe, world_line};
 use super::world::World;
@@ -175,8 +176,20 @@ impl<'a> Tube<'a> {
         &self.world.rows[self.sample(x, out)]
     }
 
+    /// The factor by the aperture at distance `x`; 1 behind a reflection.
+    fn by_aperture(&self, x: f64) -> f64 {
+        let (frame, segment) = (self.world.frame, self.segment);
+        if !loses_by_aperture(frame) || segment.reflected {
+            return 1.0;
+        }
+        let table = |at: usize| self.world.apertures[at].map(f64::from);
+        let lost = lost_of(segment.weight) + f64::from(self.tissue.absorption) * x;
+        let nepers = nepers(frame, table, segment.line, self.time(x), lost);
+        if nepers - lost < f64::from(frame.min_weight).ln() { 0.0 } else { nepers.exp() }
+    }
+
     /// Weight at distance `x` without absorption: smaller off the scanline, and averaged where a rough
-    /// reflection has spread the path over many resolution cells.
+    /// reflection has spread the path over many resolution cells; with the factor by the aperture.
     pub(super) fn weight(&self, x: f64, row: &Row) -> f64 {
         let [a, b, c] = self.segment.spread;
         let variance = a + 2.0 * b * x + c * x * x;
@@ -184,6 +197,7 @@ impl<'a> Tube<'a> {
         let cells = wider(row.sigma_lateral) * wider(row.sigma_elevation);
         let averaged = (self.segment.share / cells).sqrt().min(1.0);
         self.segment.weight
+            * self.by_aperture(x)
             * averaged
             * beam_weight(self.world.frame, self.off[0] + x * self.off[1])
     }

@@ -2,6 +2,7 @@
 
 use glam::{DAffine3, DVec3};
 
+use super::aperture::{UNKNOWN, loses_by_aperture, lost_of, nepers, place, time_of};
 use super::geometry::{face, line_pitch, world_line};
 use super::interface::{self, Interface};
 use super::path::{PURPOSE_SURVIVAL, Path, Role, reflect, step, widen};
@@ -11,8 +12,9 @@ use super::straight::{Start, Toggled};
 use super::world::{World, affine};
 use super::{Accumulator, Segment, acoustics};
 use insonify::sim::layout::{
-    Counters, FLAG_FACE_REFLECTION, FLAG_ROUGH_TRANSMISSION, LEAST_PITCH, LEAST_SURVIVAL,
-    SAMPLING_MAIN_PATH, SAMPLING_SHARED_PRIMARY, STRIP_LIMIT,
+    APERTURE_BANDS, Counters, FLAG_FACE_REFLECTION, FLAG_ROUGH_TRANSMISSION, HARDLY_PASSED,
+    LEAST_MAIN, LEAST_PASSED, LEAST_PITCH, LEAST_SURVIVAL, OTHER_SPEED, SAMPLING_MAIN_PATH,
+    SAMPLING_SHARED_PRIMARY, STRIP_LIMIT,
 };
 
 /// The results of `trace`.
@@ -22,6 +24,8 @@ pub struct Traced {
     pub surface: Accumulator,
     /// Segments per line e * scanlines + l, by path; none is dropped for lack of room.
     pub segments: Vec<Vec<Segment>>,
+    /// Nepers that the main paths have lost, by layer, node and scanline; empty where losses do not count by the aperture.
+    pub lost: Vec<f64>,
     /// Counters; `segments_dropped` is the number beyond the frame's capacity.
     pub counters: Counters,
 }
@@ -29,22 +33,35 @@ pub struct Traced {
 struct Tracer<'a> {
     world: &'a World<'a>,
     probe_from_world: DAffine3,
+    /// True while main paths are followed for what they lose.
+    ahead: bool,
+    /// The next node that a main path reaches.
+    node: u32,
     out: Traced,
+}
+
+/// Nepers that the main paths lose, by layer, node and scanline; none where losses do not count by the aperture.
+pub fn losses(world: &World, starts: &[Start]) -> Vec<f64> {
+    let frame = world.frame;
+    let lines = frame.layers * frame.scanlines;
+    if !loses_by_aperture(frame) {
+        return Vec::new();
+    }
+    let mut tracer = Tracer::new(world, vec![0.0; (lines * (APERTURE_BANDS + 1)) as usize]);
+    tracer.ahead = true;
+    for line in 0..lines {
+        tracer.node = 0;
+        let path = tracer.start(line, 0, &starts[line as usize]);
+        tracer.follow(path);
+    }
+    tracer.out.lost
 }
 
 /// Follows all paths of all lines from their starts.
 pub fn trace(world: &World, starts: &[Start]) -> Traced {
     let frame = world.frame;
     let lines = frame.layers * frame.scanlines;
-    let mut tracer = Tracer {
-        world,
-        probe_from_world: affine(&frame.probe_from_world),
-        out: Traced {
-            surface: Accumulator::new(frame),
-            segments: vec![Vec::new(); lines as usize],
-            counters: Counters::default(),
-        },
-    };
+    let mut tracer = Tracer::new(world, losses(world, starts));
     for line in 0..lines {
         for n in 0..frame.paths {
             let path = tracer.start(line, n, &starts[line as usize]);
@@ -59,7 +76,23 @@ pub fn trace(world: &World, starts: &[Start]) -> Traced {
     out
 }
 
-impl Tracer<'_> {
+impl<'a> Tracer<'a> {
+    fn new(world: &'a World<'a>, lost: Vec<f64>) -> Self {
+        let frame = world.frame;
+        Self {
+            world,
+            probe_from_world: affine(&frame.probe_from_world),
+            ahead: false,
+            node: 0,
+            out: Traced {
+                surface: Accumulator::new(frame),
+                segments: vec![Vec::new(); (frame.layers * frame.scanlines) as usize],
+                lost,
+                counters: Counters::default(),
+            },
+        }
+    }
+
     fn start(&self, line: u32, n: u32, begin: &Start) -> Path {
         let frame = self.world.frame;
         let start = world_line(frame, line % frame.scanlines, line / frame.scanlines);
@@ -100,6 +133,7 @@ impl Tracer<'_> {
             survival: 1.0,
             stack: begin.media.clone(),
             t_min,
+            shadowed: false,
         }
     }
 
@@ -112,14 +146,15 @@ impl Tracer<'_> {
         let frame = self.world.frame;
         for _ in 0..64 + frame.max_interactions {
             if self.ended(&path) {
-                return;
+                break;
             }
-            let t_end = (self.end() - path.time) * self.speed(&path.stack);
+            let t_end = (self.end() - path.time) * self.speed(&path);
             let range = [path.t_min, t_end];
             let crossings = self.world.crossings(path.origin, path.direction, range);
             self.out.counters.rays += 1;
             let nearest = crossings.first().map_or(t_end, |c| c.t);
             if self.flies_past(&path, t_end, self.world.meets_mask(&crossings)) {
+                self.note(&path, None, f64::INFINITY);
                 return;
             }
             if let Some((t, normal)) = self.face(&path, nearest) {
@@ -136,6 +171,7 @@ impl Tracer<'_> {
             } else {
                 if crossings.is_empty() {
                     self.emit(&path, t_end);
+                    self.lose(&path, f64::INFINITY);
                     return;
                 }
                 let toggled = self.world.toggled(&path.stack, &crossings);
@@ -164,8 +200,31 @@ impl Tracer<'_> {
                 self.interact(&mut path, hit.t);
                 let row = &self.world.rows[self.out.surface.sample(path.time)];
                 let interface = interface::meet(self.world, row, &path, &hit, &after);
-                interface.echo(self.world, &path, &mut self.out.surface);
+                let whole = self.whole(&path);
+                let faint = self.is_steady(&path)
+                    && (whole.weight < f64::from(frame.min_weight)
+                        || path.shadowed && self.is_hidden(&path, &interface));
+                if !self.ahead && !faint {
+                    interface.echo(self.world, &whole, &mut self.out.surface);
+                }
                 let goes_on = match path.role {
+                    Role::Main if self.is_steady(&path) => {
+                        if !faint {
+                            self.branch(&whole, &interface);
+                        }
+                        if self.is_hidden(&path, &interface) || path.shadowed {
+                            path.shadowed = true;
+                            let passed = 1.0 - interface.reflectance;
+                            path.weight *= passed.max(LEAST_PASSED.into());
+                            path.stack = after;
+                            continue;
+                        }
+                        let turned = interface.turned(self.world, &path, interface.refracting);
+                        let passed = turned.map_or(0.0, |_| 1.0 - interface.reflectance);
+                        path.weight *= passed.max(LEAST_PASSED.into());
+                        self.pass(&mut path, &interface, interface.refracting, after);
+                        true
+                    }
                     Role::Main => {
                         self.branch(&path, &interface);
                         path.weight *= 1.0 - interface.reflectance;
@@ -177,6 +236,61 @@ impl Tracer<'_> {
                     return;
                 }
             }
+        }
+        self.lose_no_more(&path);
+    }
+
+    /// True for a main path that goes on where its own beam is dark.
+    fn is_steady(&self, path: &Path) -> bool {
+        path.role == Role::Main && loses_by_aperture(self.world.frame)
+    }
+
+    /// True for a main path at a surface that lets hardly anything through.
+    fn is_hidden(&self, path: &Path, interface: &Interface) -> bool {
+        self.is_steady(path) && interface.reflectance > 1.0 - f64::from(HARDLY_PASSED)
+    }
+
+    /// True for a shadowed path in a medium of another speed than tissue, past which others reach.
+    fn is_passed_by(&self, path: &Path, speed: f64) -> bool {
+        let assumed = f64::from(self.world.frame.speed);
+        path.shadowed && (speed - assumed).abs() > f64::from(OTHER_SPEED) * assumed
+    }
+
+    /// A main path with the weight of the whole beam where it is.
+    fn whole(&self, path: &Path) -> Path {
+        let mut whole = path.clone();
+        if self.is_steady(path) && !self.ahead {
+            let table = |at: usize| [self.world.apertures[at][0].into(), self.out.lost[at]];
+            let lost = lost_of(path.weight);
+            whole.weight *= nepers(self.world.frame, table, path.line, path.time, lost).exp();
+        }
+        whole
+    }
+
+    /// Notes what a main path loses in its medium up to a time at the nodes that it reaches before.
+    fn lose(&mut self, path: &Path, until: f64) {
+        let (tissue, _) = self.world.medium(&path.stack);
+        let absorption = f64::from(self.world.tissues[tissue as usize].absorption);
+        self.note(path, Some(absorption * self.speed(path)), until);
+    }
+
+    /// Notes that a main path has ended; one without a weight was not followed.
+    fn lose_no_more(&mut self, path: &Path) {
+        self.note(path, (path.weight > 0.0).then_some(0.0), f64::INFINITY);
+    }
+
+    fn note(&mut self, path: &Path, rate: Option<f64>, until: f64) {
+        let frame = self.world.frame;
+        if !self.ahead {
+            return;
+        }
+        while self.node <= APERTURE_BANDS && time_of(frame, self.node) < until {
+            let way = time_of(frame, self.node) - path.time;
+            let at = place(frame, path.line, self.node);
+            let followed = rate.filter(|_| way >= 0.0);
+            self.out.lost[at] = followed
+                .map_or(UNKNOWN, |rate| (lost_of(path.weight) + rate * way).min(lost_of(0.0)));
+            self.node += 1;
         }
     }
 
@@ -190,18 +304,23 @@ impl Tracer<'_> {
         !self.world.is_heard(&path.stack) && !mask_ahead && !bounces
     }
 
-    /// Speed of a path: that of its medium, or around the masks that of the acquired image.
-    fn speed(&self, media: &Stack) -> f64 {
-        let (tissue, _) = self.world.medium(media);
-        let heard = self.world.is_heard(media);
-        let speed = self.world.tissues[tissue as usize].speed;
-        f64::from(if heard { speed } else { self.world.frame.speed })
+    /// Speed of a path: that of its medium, or around the masks, and past what throws a shadow, that of the acquired
+    /// image.
+    fn speed(&self, path: &Path) -> f64 {
+        let (tissue, _) = self.world.medium(&path.stack);
+        let heard = self.world.is_heard(&path.stack);
+        let speed = f64::from(self.world.tissues[tissue as usize].speed);
+        let assumed = !heard || self.is_passed_by(path, speed);
+        if assumed { f64::from(self.world.frame.speed) } else { speed }
     }
 
     fn ended(&self, path: &Path) -> bool {
         path.interactions >= self.world.frame.max_interactions
-            || path.weight * path.survival < f64::from(self.world.frame.min_weight)
             || path.time >= self.end()
+            || match self.is_steady(path) {
+                true => path.weight <= 0.0,
+                false => path.weight * path.survival < f64::from(self.world.frame.min_weight),
+            }
     }
 
     /// The transducer's face, for reflected paths, if it is nearer than `limit`.
@@ -239,10 +358,14 @@ impl Tracer<'_> {
     }
 
     /// Moves the path by `t`.
-    fn advance(&self, path: &mut Path, t: f64) {
+    fn advance(&mut self, path: &mut Path, t: f64) {
+        self.lose(path, path.time + t / self.speed(path));
         path.origin += t * path.direction;
         path.weight *= self.world.unabsorbed(&path.stack, t);
-        path.time += t / self.speed(&path.stack);
+        if self.is_steady(path) {
+            path.weight = path.weight.max(LEAST_MAIN.into());
+        }
+        path.time += t / self.speed(path);
         let [a, b, c] = path.spread;
         path.spread = [a + 2.0 * b * t + c * t * t, b + c * t, c];
         let [a, b, c] = path.lens;
@@ -254,8 +377,8 @@ impl Tracer<'_> {
     /// Follows the reflected part that main-path sampling splits off, to its end.
     fn branch(&mut self, main: &Path, interface: &Interface) {
         let frame = self.world.frame;
-        let Some(echo) = interface.micro.filter(|_| main.reflections < frame.max_reflections)
-        else {
+        let reflects = !self.ahead && main.reflections < frame.max_reflections;
+        let Some(echo) = interface.micro.filter(|_| reflects) else {
             return;
         };
         let (n, big_r) = (f64::from(frame.paths), interface.reflectance);
@@ -312,10 +435,17 @@ impl Tracer<'_> {
             Some(micro) if rough => micro.normal,
             _ => interface.refracting,
         };
-        let Some(direction) = interface.turned(self.world, path, normal) else {
+        if interface.turned(self.world, path, normal).is_none() {
             self.out.counters.paths_lost += 1;
             return false;
-        };
+        }
+        self.pass(path, interface, normal, after);
+        true
+    }
+
+    /// Goes through a surface of this normal, straight on where all is reflected.
+    fn pass(&self, path: &mut Path, interface: &Interface, normal: DVec3, after: Stack) {
+        let direction = interface.turned(self.world, path, normal).unwrap_or(path.direction);
         let row = &self.world.rows[self.out.surface.sample(path.time)];
         path.lens[2] += f64::from(row.aperture) * interface.bending(path, normal);
         let lateral = (path.lateral - path.lateral.dot(direction) * direction).normalize();
@@ -323,7 +453,6 @@ impl Tracer<'_> {
         path.direction = direction;
         path.lateral = lateral;
         path.stack = after;
-        true
     }
 
     /// True if the volume echoes of a branch are below the volume floor.
@@ -367,7 +496,10 @@ impl Tracer<'_> {
         let scatters = self.world.tissues[tissue as usize].presence > 0.0;
         let holds_echoes = scatters || !self.world.points.is_empty();
         // A NaN length is no stretch either.
-        if !holds_echoes || length.partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater) {
+        if self.ahead
+            || !holds_echoes
+            || length.partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater)
+        {
             return;
         }
         let frame = self.world.frame;

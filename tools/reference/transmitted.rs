@@ -1,12 +1,13 @@
 //! The middle of a beam through the anatomy: what `trace` follows before anything random, transmitted at every surface,
 //! as a chain of straight ways, each in one medium.
 
+use super::aperture::loses_by_aperture;
 use super::geometry::Line;
 use super::interface;
 use super::path::{Path, Role, step};
 use super::straight::{Start, Toggled};
 use super::world::World;
-use insonify::sim::layout::Frame;
+use insonify::sim::layout::{Frame, LEAST_MAIN, LEAST_PASSED};
 
 /// A straight way in one medium.
 #[derive(Clone, Debug)]
@@ -64,6 +65,7 @@ pub(super) fn middle(frame: &Frame, line: u32, along: Line, begin: &Start) -> Pa
         survival: 1.0,
         stack: begin.media.clone(),
         t_min: if begin.travelled > 0.0 { step(origin) } else { 0.0 },
+        shadowed: false,
     }
 }
 
@@ -125,13 +127,19 @@ pub(super) fn ways(
             let incidence =
                 path.direction.cross(normal).length().atan2(-path.direction.dot(normal));
             let turned = interface.turned(world, &path, interface.refracting);
-            let transmitted = turned.map_or(0.0, |_| (1.0 - interface.reflectance).max(0.0));
+            let mut transmitted = turned.map_or(0.0, |_| (1.0 - interface.reflectance).max(0.0));
+            if loses_by_aperture(frame) {
+                transmitted = transmitted.max(LEAST_PASSED.into());
+            }
             if let Some(direction) = turned {
                 path.direction = direction;
                 let across = path.lateral - path.lateral.dot(direction) * direction;
                 path.lateral = across.normalize();
             }
             path.weight *= transmitted;
+            if loses_by_aperture(frame) {
+                path.weight = path.weight.max(LEAST_MAIN.into());
+            }
             surface = Some(Passed { incidence, transmitted });
             lost = transmitted <= 0.0;
         }

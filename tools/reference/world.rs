@@ -57,6 +57,9 @@ pub struct World<'a> {
     pub points: &'a [[f32; 4]],
     /// Displacement fields of deforming instances.
     pub fields: &'a [[f32; 3]],
+    /// Factor by the aperture and loss of the main path, nepers, by layer, node and scanline; read where losses count by
+    /// the aperture.
+    pub apertures: &'a [[f32; 2]],
 }
 
 /// A ray's crossing of one mesh.

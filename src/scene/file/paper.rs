@@ -3,12 +3,13 @@
 use std::path::Path;
 
 /// Settings for every scene.
-const SIMULATION: [(&str, &str); 7] = [
+const SIMULATION: [(&str, &str); 8] = [
     ("simulation.sampling", "plain"),
     ("simulation.coherence", "coherent"),
     ("simulation.rough_transmission", "true"),
     ("simulation.beam_footprint", "false"),
     ("simulation.refraction", "ray"),
+    ("simulation.loss", "ray"),
     ("simulation.scatter_mode", "voxel"),
     ("simulation.texture_space", "world"),
 ];

@@ -18,6 +18,7 @@ pub const EXPECT: Pass = Pass {
         "scanlines",
         "speckle",
         "expected",
+        "apertures",
     ],
     makes: &[
         Array::new("speckle", Float, 1, |s| u64::from(s.frame.samples) * u64::from(s.frame.layers)),

@@ -28,6 +28,7 @@ pub const LABEL: Pass = Pass {
         "instances_before",
         "fields_before",
         "labels",
+        "apertures",
     ],
     makes: &[
         Array::of::<Frame>("frame_before", Word, |_| 1),

@@ -23,6 +23,7 @@ pub const SCATTER: Pass =
             "scanlines",
             "fields",
             "point_echoes",
+            "apertures",
         ],
         makes: &[
             Array::new("volume_echoes", Integer, 2, Sizes::samples).zeroed(),

@@ -2,6 +2,7 @@
 
 use super::super::layout::MAX_PIECES;
 use super::super::pass::{Array, Extent, Pass, Sizes, Variants, per_line};
+use super::aperture::SHADES;
 use crate::output::npy::Element::Float;
 use crate::scene::Scene;
 
@@ -22,8 +23,9 @@ pub const SHADOW: Pass = Pass {
         "rows",
         "pieces",
         "scanlines",
+        "shades",
     ],
-    makes: &[Array::new("pieces", Float, 4, |s| MAX_PIECES as u64 * s.lines())],
+    makes: &[Array::new("pieces", Float, 4, |s| MAX_PIECES as u64 * s.lines()), SHADES],
     extent: Some(per_line),
     needed: has_shadows,
     ..Pass::USUAL
@@ -32,7 +34,7 @@ pub const SHADOW: Pass = Pass {
 /// The stage that darkens the prescan behind the anatomy.
 pub const DARKEN: Pass = Pass {
     name: "darken",
-    binds: &["frame", "pieces", "prescan", "shaded"],
+    binds: &["frame", "pieces", "prescan", "shaded", "shades"],
     makes: &[Array::new("shaded", Float, 2, Sizes::samples)],
     extent: Some(|f| Extent::Threads([f.samples, f.scanlines, 1])),
     needed: has_shadows,

@@ -39,6 +39,7 @@ const ANY: Pass = Pass {
         "interactions",
         "interaction_count",
         "scanlines",
+        "apertures",
     ],
     makes: &[
         Array::new("surface_echoes", Integer, 2, Sizes::samples).zeroed(),

@@ -1,0 +1,175 @@
+#version 460
+// Losses by the aperture. A target is lit and heard by an aperture that converges on it; the rays from there cross the
+// paths of neighbouring scanlines and lose what these lose there. One thread has a scanline, at some of the nodes of depth.
+#extension GL_GOOGLE_include_directive : require
+#include "shared.glsl"
+
+layout(local_size_x = 64) in;
+layout(std430, binding = 0) restrict readonly buffer FrameBuffer { Frame frame; };
+layout(std430, binding = 1) restrict readonly buffer RowBuffer { Row rows[]; };
+layout(std430, binding = 2) restrict readonly buffer ScanlineBuffer { Scanline scanlines[]; };
+layout(std430, binding = 3) restrict buffer ApertureBuffer { vec2 apertures[]; };
+
+#include "probe.glsl"
+#include "aperture.glsl"
+
+const uint THREADS = 64u;
+const float BAND_COUNT = float(APERTURE_BANDS);
+const uint WORDS = 32u;
+// Beyond as many pairs of neighbours two share a bit.
+const uint PAIRS = 32u * WORDS;
+
+// For each band a bit for each pair of neighbouring scanlines that lose differently.
+shared uint unlike[APERTURE_BANDS * WORDS];
+// For each scanline the first node behind a surface that lets hardly anything through, four to a word.
+shared uint fronts[MAX_SCANLINES / 4u];
+
+// Nepers that the main path of scanline l of a layer loses between two nodes; UNKNOWN where it was not followed.
+float lost_in(uint layer, int l, uint begin, uint end) {
+    uint first = layer * (APERTURE_BANDS + 1u);
+    float above = apertures[(first + begin) * frame.scanlines + uint(l)].y;
+    float below = apertures[(first + end) * frame.scanlines + uint(l)].y;
+    return mix(below - above, UNKNOWN, min(above, below) <= UNKNOWN);
+}
+
+// Bit of the pair of scanline l and the next.
+uint bit_of(int l) { return uint(l) >> (frame.scanlines > PAIRS ? 1u : 0u); }
+
+void find_unlike(uint layer, uint band) {
+    uint at = 0u, found = 0u;
+    float before = lost_in(layer, 0, band, band + 1u);
+    for (int l = 1; l < int(frame.scanlines); ++l) {
+        uint bit = bit_of(l - 1);
+        if (bit >> 5u != at) {
+            unlike[band * WORDS + at] = found;
+            found = 0u;
+            at = bit >> 5u;
+        }
+        float lost = lost_in(layer, l, band, band + 1u);
+        // NaN, too, is unlike.
+        if (!(abs(lost - before) <= APERTURE_ALIKE)) found |= 1u << (bit & 31u);
+        before = lost;
+    }
+    unlike[band * WORDS + at] = found;
+}
+
+// True if neighbours from the first scanline to the last lose differently in some band of a step.
+bool loses_differently(int first, int last, uint begin, uint end) {
+    uint low = bit_of(first), high = bit_of(last - 1);
+    uint found = 0u;
+    for (uint word = low >> 5u; word <= high >> 5u; ++word) {
+        uint mask = 0xffffffffu << (word == low >> 5u ? low & 31u : 0u);
+        mask &= 0xffffffffu >> (word == high >> 5u ? 31u - (high & 31u) : 0u);
+        for (uint band = begin; band < end; ++band) found |= unlike[band * WORDS + word] & mask;
+    }
+    return found != 0u;
+}
+
+// The first node behind such a surface; beyond all nodes where there is none.
+uint find_front(uint layer, int l) {
+    for (uint node = 1u; node <= APERTURE_BANDS; ++node) {
+        if (lost_in(layer, l, node - 1u, node) > APERTURE_FRONT) return node;
+    }
+    return 255u;
+}
+
+uint front_of(int l) { return fronts[l >> 2] >> (8u * uint(l & 3)) & 255u; }
+
+// True if a ray crosses such a surface from a node of scanline `above` to a lower one of scanline `below`: it was in front of
+// the one's and is behind the other's, and both are near. An inclined surface is crossed once, whatever bands it lies in; what
+// is behind the surface of a neighbour, far below it, has crossed none.
+bool crosses_front(int above, uint begin, int below, uint end) {
+    uint before = front_of(above), behind = front_of(below);
+    uint size = end - begin;
+    return begin < before && before <= end + size && behind <= end && behind + size > begin;
+}
+
+// Scanlines beside the target's that a ray has crossed at a depth, in nodes, for each mm beside it on the aperture.
+float lines_per_mm(float at, uint node) {
+    vec2 pitch = line_pitch();
+    return (1.0 - at / float(node)) / max(pitch.x + frame.depth * at / BAND_COUNT * pitch.y, LEAST_PITCH);
+}
+
+// The farther from the target, the more bands at once: where between them something lies matters less.
+uint step_above(uint node, uint end) {
+    uint away = node - end;
+    return end - min(away < 8u ? 1u : (away < 24u ? 2u : 4u), end);
+}
+
+// Nepers that a ray from `beside` mm beside the scanline loses on its way to a target, over what the scanline's own path
+// does; `different` has a bit for each step, from the target up, in which scanlines lose differently.
+float lost_beside(uint layer, int l, uint node, float beside, uint different) {
+    float last = float(frame.scanlines - 1u);
+    float middle = float(l) + 0.5;
+    float lost = 0.0;
+    int below = l;
+    uint begin;
+    for (uint end = node; end > 0u && different != 0u; end = begin) {
+        begin = step_above(node, end);
+        int above = whole(clamp(floor(beside * lines_per_mm(float(begin), node) + middle), 0.0, last));
+        if ((different & 1u) != 0u) {
+            float half_way = beside * lines_per_mm(0.5 * float(begin + end), node);
+            float own = lost_in(layer, l, begin, end);
+            float there = lost_in(layer, whole(clamp(floor(half_way + middle), 0.0, last)), begin, end);
+            lost += mix(there - own, 0.0, min(there, own) <= UNKNOWN);
+            lost += mix(0.0, lost_of(0.0), crosses_front(above, begin, below, end));
+        }
+        different >>= 1u;
+        below = above;
+    }
+    return lost;
+}
+
+// Factor on the amplitude of a target, of both ways, nepers: for each aperture the mean over its rays of the part that
+// reaches the target, over that of its own scanline. Of the two-way amplitude that main paths carry, one way has the root.
+float converged(uint layer, int l, uint node, vec2 halves) {
+    float widest = max(halves.x, halves.y);
+    float spacing = 2.0 * widest / float(APERTURE_RAYS);
+    uint different = 0u, begin, bit = 1u;
+    for (uint end = node; end > 0u; end = begin) {
+        begin = step_above(node, end);
+        int reach = whole(ceil(clamp(widest * lines_per_mm(float(begin), node), 0.0, 1e6)));
+        int low = max(l - reach, 0), high = min(l + reach, int(frame.scanlines) - 1);
+        if (low < high && loses_differently(low, high, begin, end)) different |= bit;
+        bit <<= 1u;
+    }
+    if (different == 0u) return 0.0;
+    // What would lie beyond the face is no element. A phased array is modelled as a point, its aperture is all there.
+    float first = float(frame.first_line) + float(l) + 0.5;
+    float at_face = mix(0.0, 1.0 / max(line_pitch().x, LEAST_PITCH), frame.kind != KIND_PHASED);
+    vec2 sum = vec2(0.0), count = vec2(0.0);
+    for (uint i = 0u; i < APERTURE_RAYS; ++i) {
+        float beside = spacing * (float(i) + 0.5) - widest;
+        float element = first + beside * at_face;
+        bool exists = element >= 0.0 && element <= float(face_lines());
+        // The narrower aperture has some of the rays, the outermost in part.
+        vec2 share = clamp((halves - abs(beside)) / spacing + 0.5, 0.0, 1.0) * mix(0.0, 1.0, exists);
+        if (max(share.x, share.y) <= 0.0) continue;
+        sum += share * exp(-0.5 * lost_beside(layer, l, node, beside, different));
+        count += share;
+    }
+    return log(max(sum.x, 1e-30) / count.x) + log(max(sum.y, 1e-30) / count.y);
+}
+
+void main() {
+    uint thread = gl_LocalInvocationID.x;
+    uint layer = gl_WorkGroupID.z;
+    for (uint band = thread; band < APERTURE_BANDS; band += THREADS) find_unlike(layer, band);
+    for (uint word = thread; 4u * word < frame.scanlines; word += THREADS) {
+        uint packed = 0u;
+        for (uint i = 0u; i < 4u; ++i) {
+            int l = int(min(4u * word + i, frame.scanlines - 1u));
+            packed |= find_front(layer, l) << (8u * i);
+        }
+        fronts[word] = packed;
+    }
+    barrier();
+    uint l = gl_WorkGroupID.x * THREADS + thread;
+    if (l >= frame.scanlines) return;
+    uint line = layer * frame.scanlines + l;
+    for (uint node = gl_WorkGroupID.y; node <= APERTURE_BANDS; node += APERTURE_GROUPS) {
+        uint row = sample_at(frame.depth * float(node) / (BAND_COUNT * frame.sample_pitch));
+        vec2 halves = vec2(rows[row].transmit_half, rows[row].receive_half);
+        apertures[aperture_at(line, node)].x = converged(layer, int(l), node, halves);
+    }
+}
