@@ -92,8 +92,8 @@ void meet(out Interface at, Met here, bool entering, inout Path path, uint befor
     at.curved = slope.width > 0.0;
 }
 
-void write_down(uint slot, inout Path path, uint n, inout Interface at) {
-    interactions[slot].origin_weight = vec4(path.origin, path.weight);
+void write_down(uint slot, inout Path path, uint n, inout Interface at, float weight) {
+    interactions[slot].origin_weight = vec4(path.origin, weight);
     interactions[slot].direction_time = vec4(path.direction, path.time);
     interactions[slot].lateral_reflectance = vec4(path.lateral, at.reflectance);
     interactions[slot].geometric_turn = vec4(at.geometric, at.turn);

@@ -282,6 +282,7 @@ void main() {
             }
             recall(slot, line, path, at);
             if (loses_by_aperture() && path.weight < frame.min_weight) {
+                met += 1u;
                 going = false;
                 continue;
             }
@@ -387,9 +388,10 @@ void main() {
             aimed = false;
             path.interactions += 1u;
             meet(at, here, entering, path, tissue_of(before), tissue_of(behind));
-            // The far side of what throws the shadow is hidden from all of the aperture.
-            if (role == ROLE_MAIN && !(path.shadowed && at.reflectance > 1.0 - HARDLY_PASSED)) {
-                write_down(slot + written, path, n, at);
+            if (role == ROLE_MAIN) {
+                // The far side of what throws the shadow is hidden from all of the aperture.
+                bool hidden = path.shadowed && at.reflectance > 1.0 - HARDLY_PASSED;
+                write_down(slot + written, path, n, at, mix(path.weight, 0.0, hidden));
                 written += 1u;
             }
         }

@@ -58,6 +58,7 @@ fn fan(before: [f64; 2], behind: [f64; 2]) -> Scene {
     scene.probe.samples = 64;
     // Near total reflection, and into air, little goes through.
     scene.simulation.min_weight = 1e-12;
+    scene.simulation.loss = Loss::Ray;
     // Near, so that the outermost scanline meets it within the image's depth.
     add_layer(&mut scene, 1.0, silent(behind[0], behind[1], 0.0));
     // Far away: it makes paths leave segments in silence.

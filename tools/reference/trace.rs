@@ -382,7 +382,7 @@ impl<'a> Tracer<'a> {
             return;
         };
         let (n, big_r) = (f64::from(frame.paths), interface.reflectance);
-        let mut path = Path { role: Role::Branch, ..main.clone() };
+        let mut path = Path { role: Role::Branch, shadowed: false, ..main.clone() };
         let branches = (n * big_r).ceil().clamp(1.0, n);
         if f64::from(main.n) >= branches {
             return;
@@ -496,7 +496,9 @@ impl<'a> Tracer<'a> {
         let scatters = self.world.tissues[tissue as usize].presence > 0.0;
         let holds_echoes = scatters || !self.world.points.is_empty();
         // A NaN length is no stretch either.
+        let speed = self.world.tissues[tissue as usize].speed.into();
         if self.ahead
+            || self.is_passed_by(path, speed)
             || !holds_echoes
             || length.partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater)
         {
