@@ -6,6 +6,7 @@ use super::shaders::Library;
 use super::{SimError, Simulator, Tracer};
 use crate::gpu::Device;
 use crate::scene::Scene;
+use crate::settings::Loss;
 
 /// The area of the image in which each of these instances of `scene` is seen from where its probe is, mm2, by
 /// `instance` of the pixels' labels (docs/labels.md): what lies in shadow, or where the probe does not touch the skin,
@@ -27,6 +28,8 @@ pub fn areas(
     scene.simulation.labels = true;
     // The labels' paths are not those of the picture, of which one is enough.
     scene.simulation.paths = 1;
+    // Along the scanlines alone: what only the rim of the aperture reaches, in half-light, is not seen.
+    scene.simulation.loss = Loss::Ray;
     let mut simulator = Simulator::new(device, library, &scene, tracer)?;
     simulator.frame(&scene, 0)?;
     let pitch = f64::from(simulator.constants().pixel_pitch);
