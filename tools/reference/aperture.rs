@@ -235,7 +235,7 @@ mod tests {
                 let free = (0.5 + beside / width).clamp(0.0, 1.0);
                 // A ray of 16, the line that it falls on, and where in a step of four bands the plane lies.
                 let step = 2.0 / (f64::from(node) - 16.5) * beside.abs() / width;
-                let allowed = 0.5 / 16.0 + 0.1 / width + 0.01 + step;
+                let allowed = 1.0 / 16.0 + 0.1 / width + step;
                 assert!((left.sqrt() - free).abs() < allowed, "{node} {line}: {left} {free}");
             }
         }
