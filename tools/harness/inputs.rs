@@ -156,7 +156,6 @@ pub fn rows(frame: &Frame) -> Vec<Row> {
                 lobe: 10.0 + 0.2 * depth,
                 transmit_half: (0.21 * depth).min(7.13),
                 receive_half: 0.173 * depth,
-                ..Row::default()
             }
         })
         .collect()

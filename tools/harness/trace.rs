@@ -165,7 +165,7 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     let otherwise = |(node, lost): &(&[f32; 2], &f64)| {
         let error = (f64::from(node[1]) - **lost).abs();
         // NaN, too, is an error.
-        !(error < 1e-3 + 1e-3 * lost.abs())
+        error.is_nan() || error >= 1e-3 + 1e-3 * lost.abs()
     };
     let lost_otherwise = table.iter().zip(&twin.lost).filter(otherwise).count();
     let kept = |c: &Counters| [c.paths_lost, c.stack_overflow, c.segments_dropped];
