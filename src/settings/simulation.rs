@@ -55,11 +55,11 @@ words! {
 }
 
 words! {
-    /// What is lost on the way to a target.
+    /// The losses that count on the way to a target.
     pub enum Loss {
         /// The mean over the aperture that converges on it: shadows and borders have penumbras.
         Beam = "beam",
-        /// What the scanline alone meets.
+        /// Those that the scanline alone meets.
         Ray = "ray",
     }
 }

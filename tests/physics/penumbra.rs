@@ -204,8 +204,8 @@ fn edges(bench: &Bench, physics: Physics) -> Outcome {
 
 #[test]
 fn the_law_is_that_of_half_planes() {
-    // F/2: at 30 mm behind 17 mm an aperture of 15 mm covers 6.5 mm there; 0.1 = f^4 at 0.0623 of its half
-    // width beside the middle, 0.9 at 0.4740 of it.
+    // F/2: at 30 mm behind 17 mm an aperture of 15 mm covers 6.5 mm there; 0.1 = f^4 at 0.0623 of that
+    // beside the middle, 0.9 at 0.4740 of it.
     let case = &CASES[0];
     let scene = behind_a_plate(case, 0);
     let covered = 30.0 / 2.0 * (1.0 - 17.0 / 30.0);

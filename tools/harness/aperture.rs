@@ -1,7 +1,7 @@
 //! `aperture`: losses by the part of the aperture that they lie in front of.
 
-use super::inputs::{Random, frame, lines, rows, scanlines};
-use super::{Case, Check, Input, Job, Size, Subject};
+use super::inputs::{Random, frame, rows, scanlines};
+use super::{Case, Check, Input, Job, Size, Subject, trace};
 use crate::reference::aperture;
 use insonify::sim::layout::{APERTURE_BANDS, Frame, Row};
 use insonify::sim::stages;
@@ -24,7 +24,7 @@ pub const SUBJECT: Subject = Subject {
 pub(super) fn losses(frame: &Frame) -> Vec<f64> {
     let nodes = APERTURE_BANDS + 1;
     let mut random = Random(31);
-    let mut lost = vec![0.0; lines(frame) * nodes as usize];
+    let mut lost = vec![0.0; trace::nodes(frame)];
     for layer in 0..frame.layers {
         let mut within = |low: f64, high: f64| random.within(low, high);
         let organs = [(); 4].map(|()| {

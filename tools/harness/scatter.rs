@@ -4,7 +4,7 @@ use super::check::relative_norm;
 use super::inputs::{Random, lines, rows, scanlines};
 use super::{Case, Check, Extent, Input, Job, Size, Subject, trace, worlds};
 use crate::reference::{Segment, origin, scatter};
-use insonify::sim::layout::{self, APERTURE_BANDS, Counters, FLAG_VOXEL, Frame};
+use insonify::sim::layout::{self, Counters, FLAG_VOXEL, Frame};
 use insonify::sim::stages;
 use insonify::sim::tables::with_spheres;
 
@@ -37,9 +37,9 @@ pub const RIGID: Subject = Subject {
 /// Segments found by the twin of `trace`, in the device's slots, with the table of what main paths lose.
 pub(super) fn segments(job: &Job, frame: &Frame) -> (Vec<layout::Segment>, Vec<u32>, Input) {
     let mut owned = worlds::owned(job);
-    let nodes = frame.scanlines * frame.layers * (APERTURE_BANDS + 1);
-    // Branches are as faint as they may be.
-    owned.apertures = vec![[0.0; 2]; nodes as usize];
+    let nodes = trace::nodes(frame);
+    // Branches as if apertures changed nothing.
+    owned.apertures = vec![[0.0; 2]; nodes];
     let mut world = owned.world();
     let rows = rows(frame);
     world.rows = &rows;
@@ -54,7 +54,7 @@ pub(super) fn segments(job: &Job, frame: &Frame) -> (Vec<layout::Segment>, Vec<u
         }
         counts.push(found.len().min(capacity) as u32);
     }
-    let lost = if traced.lost.is_empty() { vec![0.0; nodes as usize] } else { traced.lost };
+    let lost = if traced.lost.is_empty() { vec![0.0; nodes] } else { traced.lost };
     (slots, counts, trace::apertures(frame, &lost))
 }
 

@@ -103,7 +103,7 @@ pub fn scene(case: Case, size: Size) -> Vec<Input> {
 }
 
 /// Nodes of depth of all lines.
-fn nodes(frame: &Frame) -> usize {
+pub(super) fn nodes(frame: &Frame) -> usize {
     lines(frame) * (APERTURE_BANDS as usize + 1)
 }
 
