@@ -23,13 +23,17 @@ const uint PAIRS = 32u * WORDS;
 shared uint unlike[APERTURE_BANDS * WORDS];
 // For each scanline the first node behind a surface that lets hardly anything through, four to a word.
 shared uint fronts[MAX_SCANLINES / 4u];
+// A bit for each node that is one.
+shared uint front_nodes[APERTURE_BANDS / 32u + 1u];
 
-// Nepers that the main path of scanline l of a layer loses between two nodes; UNKNOWN where it was not followed.
+// Nepers that the main path of scanline l of a layer has lost down to a node.
+float lost_at(uint layer, int l, uint node) { return apertures[(layer * (APERTURE_BANDS + 1u) + node) * frame.scanlines + uint(l)].y; }
+
+// What it loses between two nodes; UNKNOWN where it was not followed.
+float lost_between(float above, float below) { return mix(below - above, UNKNOWN, min(above, below) <= UNKNOWN); }
+
 float lost_in(uint layer, int l, uint begin, uint end) {
-    uint first = layer * (APERTURE_BANDS + 1u);
-    float above = apertures[(first + begin) * frame.scanlines + uint(l)].y;
-    float below = apertures[(first + end) * frame.scanlines + uint(l)].y;
-    return mix(below - above, UNKNOWN, min(above, below) <= UNKNOWN);
+    return lost_between(lost_at(layer, l, begin), lost_at(layer, l, end));
 }
 
 // Bit of the pair of scanline l and the next.
@@ -67,8 +71,11 @@ bool loses_differently(int first, int last, uint begin, uint end) {
 
 // The first node behind such a surface; beyond all nodes where there is none.
 uint find_front(uint layer, int l) {
+    float above = lost_at(layer, l, 0u);
     for (uint node = 1u; node <= APERTURE_BANDS; ++node) {
-        if (lost_in(layer, l, node - 1u, node) > APERTURE_FRONT) return node;
+        float below = lost_at(layer, l, node);
+        if (lost_between(above, below) > APERTURE_FRONT) return node;
+        above = below;
     }
     return 255u;
 }
@@ -96,28 +103,44 @@ uint step_above(uint node, uint end) {
     return end - min(away < 8u ? 1u : (away < 24u ? 2u : 4u), end);
 }
 
-// Nepers that a ray from `beside` mm beside the scanline loses on its way to a target, over what the scanline's own path
-// does; `different` has a bit for each step, from the target up, in which scanlines lose differently.
-float lost_beside(uint layer, int l, uint node, float beside, uint different) {
-    float last = float(frame.scanlines - 1u);
-    float middle = float(l) + 0.5;
-    float lost = 0.0;
-    int below = l;
+// True if some scanline's front lies where a ray could cross it in a step.
+bool front_near(uint begin, uint end) {
+    uint found = 0u;
+    for (uint node = begin + 1u; node <= min(2u * end - begin, APERTURE_BANDS); ++node) {
+        found |= front_nodes[node >> 5u] >> (node & 31u) & 1u;
+    }
+    return found != 0u;
+}
+
+// Nepers that each ray loses on its way to the target, over what the scanline's own path does.
+float lost[APERTURE_RAYS];
+
+// Follows the rays, `spacing` mm apart on the aperture, from the target up; `different` has a bit for each step in which
+// scanlines lose differently. What all rays of a step share is computed once.
+void follow_rays(uint layer, int l, uint node, float spacing, uint different) {
+    float first = 0.5 * (1.0 - float(APERTURE_RAYS));
+    float middle = float(l) + 0.5, last = float(frame.scanlines - 1u);
+    for (uint i = 0u; i < APERTURE_RAYS; ++i) lost[i] = 0.0;
     uint begin;
     for (uint end = node; end > 0u && different != 0u; end = begin) {
         begin = step_above(node, end);
-        int above = whole(clamp(floor(beside * lines_per_mm(float(begin), node) + middle), 0.0, last));
-        if ((different & 1u) != 0u) {
-            float half_way = beside * lines_per_mm(0.5 * float(begin + end), node);
-            float own = lost_in(layer, l, begin, end);
-            float there = lost_in(layer, whole(clamp(floor(half_way + middle), 0.0, last)), begin, end);
-            lost += mix(there - own, 0.0, min(there, own) <= UNKNOWN);
-            lost += mix(0.0, lost_of(0.0), crosses_front(above, begin, below, end));
-        }
+        bool counts = (different & 1u) != 0u;
         different >>= 1u;
-        below = above;
+        if (!counts) continue;
+        float half_way = spacing * lines_per_mm(0.5 * float(begin + end), node);
+        float own = lost_in(layer, l, begin, end);
+        for (uint i = 0u; i < APERTURE_RAYS; ++i) {
+            float crossed = clamp(floor((first + float(i)) * half_way + middle), 0.0, last);
+            float there = lost_in(layer, whole(crossed), begin, end);
+            lost[i] += mix(there - own, 0.0, min(there, own) <= UNKNOWN);
+        }
+        if (!front_near(begin, end)) continue;
+        vec2 ends = spacing * vec2(lines_per_mm(float(begin), node), lines_per_mm(float(end), node));
+        for (uint i = 0u; i < APERTURE_RAYS; ++i) {
+            vec2 crossed = clamp(floor((first + float(i)) * ends + middle), vec2(0.0), vec2(last));
+            lost[i] += mix(0.0, lost_of(0.0), crosses_front(whole(crossed.x), begin, whole(crossed.y), end));
+        }
     }
-    return lost;
 }
 
 // Factor on the amplitude of a target, of both ways, nepers: for each aperture the mean over its rays of the part that
@@ -137,6 +160,7 @@ float converged(uint layer, int l, uint node, vec2 halves) {
     // What would lie beyond the face is no element. A phased array is modelled as a point, its aperture is all there.
     float first = float(frame.first_line) + float(l) + 0.5;
     float at_face = mix(0.0, 1.0 / max(line_pitch().x, LEAST_PITCH), frame.kind != KIND_PHASED);
+    follow_rays(layer, l, node, spacing, different);
     vec2 sum = vec2(0.0), count = vec2(0.0);
     for (uint i = 0u; i < APERTURE_RAYS; ++i) {
         float beside = spacing * (float(i) + 0.5) - widest;
@@ -145,7 +169,7 @@ float converged(uint layer, int l, uint node, vec2 halves) {
         // The narrower aperture has some of the rays, the outermost in part.
         vec2 share = clamp((halves - abs(beside)) / spacing + 0.5, 0.0, 1.0) * mix(0.0, 1.0, exists);
         if (max(share.x, share.y) <= 0.0) continue;
-        sum += share * exp(-0.5 * lost_beside(layer, l, node, beside, different));
+        sum += share * exp(-0.5 * lost[i]);
         count += share;
     }
     return log(max(sum.x, 1e-30) / count.x) + log(max(sum.y, 1e-30) / count.y);
@@ -154,12 +178,16 @@ float converged(uint layer, int l, uint node, vec2 halves) {
 void main() {
     uint thread = gl_LocalInvocationID.x;
     uint layer = gl_WorkGroupID.z;
+    if (thread < APERTURE_BANDS / 32u + 1u) front_nodes[thread] = 0u;
+    barrier();
     for (uint band = thread; band < APERTURE_BANDS; band += THREADS) find_unlike(layer, band);
     for (uint word = thread; 4u * word < frame.scanlines; word += THREADS) {
         uint packed = 0u;
         for (uint i = 0u; i < 4u; ++i) {
             int l = int(min(4u * word + i, frame.scanlines - 1u));
-            packed |= find_front(layer, l) << (8u * i);
+            uint front = find_front(layer, l);
+            if (front <= APERTURE_BANDS) atomicOr(front_nodes[front >> 5u], 1u << (front & 31u));
+            packed |= front << (8u * i);
         }
         fronts[word] = packed;
     }
@@ -167,7 +195,7 @@ void main() {
     uint l = gl_WorkGroupID.x * THREADS + thread;
     if (l >= frame.scanlines) return;
     uint line = layer * frame.scanlines + l;
-    for (uint node = gl_WorkGroupID.y; node <= APERTURE_BANDS; node += APERTURE_GROUPS) {
+    for (uint node = gl_WorkGroupID.y; node <= APERTURE_BANDS; node += gl_NumWorkGroups.y) {
         uint row = sample_at(frame.depth * float(node) / (BAND_COUNT * frame.sample_pitch));
         vec2 halves = vec2(rows[row].transmit_half, rows[row].receive_half);
         apertures[aperture_at(line, node)].x = converged(layer, int(l), node, halves);

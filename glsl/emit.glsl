@@ -64,12 +64,17 @@ vec2 strip_of(inout Path path, vec2 nominal) {
     return path.strip.x < 0.0 ? -path.strip : path.strip;
 }
 
+// Part of the weight with which the group of a path counts in power.
+float of_group(inout Path path) {
+    return path.branch ? sqrt(path.probability * path.share * float(path.count)) : 1.0;
+}
+
 // Writes a segment, unless another path writes it. Its weight and share say which part of the volume echoes this path
 // stands for, and over how many paths they average.
 void emit_segment(inout Path path, uint line, uint n, uint instance, float extent) {
     bool whole = paths_are_alike() && (frame.sampling == SAMPLING_MAIN_PATH
         || (frame.sampling == SAMPLING_SHARED_PRIMARY && path.interactions == 0u));
-    if (whole && n != 0u || again != 0u) return;
+    if (whole && n != path.first || again != 0u) return;
     if (!is_heard(media)) return;
     uint tissue = tissue_of(instance);
     if (is_passed_by(path, tissues[tissue].speed)) return;
@@ -81,8 +86,8 @@ void emit_segment(inout Path path, uint line, uint n, uint instance, float exten
         return;
     }
     uint at = line * frame.segment_capacity + slot;
-    // Speckle adds in power.
-    float weight = path.weight * sqrt(path.survival) * mix(path.share, 1.0, whole);
+    // Speckle adds in power; the first of a group stands for all of it.
+    float weight = path.weight * mix(sqrt(path.survival) * path.share, of_group(path), whole);
     float share = mix(max(1.0, path.probability / (path.survival * path.share)), 1.0, whole);
     segments[at].origin_length = vec4(path.origin, extent);
     segments[at].direction_time = vec4(path.direction, path.time);

@@ -47,7 +47,7 @@ float power_of(Stretch s, uint k, uint layer) {
     float amplitude = s.weight * thinning(s, x, k) * exp(-s.absorption * x) * exp2(tissues[s.tissue].level);
     float power = amplitude * amplitude;
     // In faster tissue a sample is longer and holds more scatterers.
-    if ((frame.flags & FLAG_VOXEL) == 0u) power *= s.speed / frame.speed * sqrt(narrowing(s, x, k));
+    if ((frame.flags & FLAG_VOXEL) == 0u) power *= s.speed / frame.speed * spoiled(s, x, k);
     return power * (to - from) * speckle[k * frame.layers + layer];
 }
 

@@ -131,6 +131,8 @@ void recall(uint slot, uint line, out Path path, out Interface at) {
     path.left_instance = NONE;
     path.left_primitive = NONE;
     path.branch = false;
+    path.first = 0u;
+    path.count = 1u;
     path.shadowed = false;
     path.survival = 1.0;
     at.geometric = interactions[slot].geometric_turn.xyz;

@@ -17,6 +17,7 @@ struct Path {
     uint left_instance; uint left_primitive; // the triangle that it starts on; NONE: none
     float survival;     // probability with which it was followed; its weight is divided by it
     bool branch;
+    uint first; uint count; // the paths that have come the same way, a group: this one is one of them
     bool shadowed;      // a main path behind a surface that lets hardly anything through: only others of the aperture reach there
 };
 
@@ -27,6 +28,7 @@ uvec4 draw(uint n, uint key, uint purpose) {
 // Random numbers of one line's interaction, for decisions that neighbouring lines must not share.
 const uint PURPOSE_DITHER = 0x51ed270bu;
 const uint PURPOSE_SURVIVAL = 0x2545f491u;
+const uint PURPOSE_PARTS = 0x85ebca6bu;
 
 uvec4 line_random(uint line, uint n, uint key, uint purpose) {
     // As the same line has it among all of the face.
@@ -58,6 +60,8 @@ void begin(vec3 origin, vec3 direction, vec3 lateral, out Path path) {
     path.reflections = 0u;
     path.crossings = 0u;
     path.branch = false;
+    path.first = 0u;
+    path.count = 1u;
     path.shadowed = false;
     path.survival = 1.0;
     path.left_instance = NONE;

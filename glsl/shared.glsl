@@ -32,6 +32,9 @@ const uint ROLE_MAIN = 1u;          // paths are transmitted at every surface an
 const uint ROLE_BRANCHES = 2u;      // paths echo at the recorded interactions and follow what is reflected there
 const uint TRACE_GROUP = 64u;        // threads of a work group of paths
 const float LEAST_SURVIVAL = 0.03125; // smallest probability with which a faint branch is followed
+const uint TRAIN_PATHS = 4u;         // least number of paths that follow what may go to and fro between two faces
+const float TRAIN_FACING = 0.95;     // cosine between a path and a surface's normal from which on it may
+const float TRAIN_FLOOR = 5e-4;      // amplitude, attenuation made up for, from which on it is followed on every line
 
 const uint FLAG_ROUGH_TRANSMISSION = 1u;
 const uint FLAG_FACE_REFLECTION = 2u;
@@ -55,7 +58,6 @@ const float STRIP_LIMIT = 4.0;      // a scanline's strip of scatterers is at mo
 const float STRIP_CUT = 2.5;        // deviations of a narrow beam at which its strip ends
 const float LEAST_PITCH = 1e-6;     // mm: smallest distance between scanlines, where all of them meet
 const uint APERTURE_BANDS = 48u;    // bands of equal depth in which the losses of main paths are compared
-const uint APERTURE_GROUPS = 4u;    // work groups that share the nodes of a block of scanlines
 const uint APERTURE_RAYS = 16u;     // rays from the aperture to a target
 const float APERTURE_ALIKE = 2e-3;  // nepers: scanlines lose alike in a band if no neighbours differ by more
 const float APERTURE_FRONT = 3.0;   // nepers lost in a band from which on it has a surface that lets hardly anything through
@@ -174,6 +176,10 @@ struct Row {
     float lobe;                                   // how fast the echo of a small mirror falls with its tilt: per squared sine
                                                   // of the angle between what it reflects and the way back
     float transmit_half; float receive_half;      // mm: half the apertures that converge on this depth
+    float variances;                              // mm^2: of the transmitted beam across and of the received one, their sum
+    float defocus; float transmit_sine;           // mm: how far from the axis what the transmit focus collects from one deviation
+                                                  // of the aperture is here, below 0 behind the focus; its decrease per mm
+    float unused0;
 };
 
 // A straight part of a path inside one medium.

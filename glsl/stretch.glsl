@@ -116,11 +116,22 @@ float strip_ratio(Stretch s, float x) {
     return clamp(abs(s.strip.x + x * s.strip.y) / nominal, 1.0 / STRIP_LIMIT, STRIP_LIMIT);
 }
 
-// The factor on the amplitude of a scatterer at distance x. Behind a surface that bends the wavefront fewer of the beam's parts
-// arrive together: a scatterer is fainter by as much as it would be wider.
+// The factor on the power of speckle at distance x: where two beams whose intensities are Gaussians meet it is 1 over the root of
+// the sum of their variances. A surface that bends the wavefront makes them wider, or narrower: the received beam, which
+// converges on x, misses it by the offset; the transmitted one, narrower or wider than that where it passed the surface, is as
+// much closer to its focus or farther from it.
+float spoiled(Stretch s, float x, uint row) {
+    float off = offset_at(s, vec3(x)).x, turn = s.lens.y + 2.0 * x * s.lens.z;
+    float defocus = rows[row].defocus;
+    float moved = (0.5 * turn * defocus + off * rows[row].transmit_sine) / rows[row].aperture;
+    float more = off * off + moved * (moved + 2.0 * defocus);
+    return inversesqrt(1.0 + min(more / rows[row].variances, MOST_WIDENED));
+}
+
+// The same on the amplitude of a scatterer.
 float scattered(Stretch s, float x, uint row) {
     if (all(equal(s.lens, vec3(0.0)))) return 1.0;
-    return sqrt(sqrt(narrowing(s, x, row)));
+    return sqrt(spoiled(s, x, row));
 }
 
 // The part of a scatterer's amplitude that a scanline hears `across` mm beside its path, in a strip `wide` to either side, of

@@ -94,6 +94,7 @@ uint row_of(float time) {
 #include "aperture.glsl"
 #include "emit.glsl"
 #include "interface.glsl"
+#include "branch.glsl"
 
 // Reads the paths of a piece of work; false if there is no such interaction.
 bool take(uint piece, out uint line, out uint next, out uint last, out uint main_path, out uint slot) {
@@ -160,19 +161,6 @@ void bounce(inout Path path, inout Echo echo, uint line, bool heard) {
     reflect_path(path, side, SPECULAR, 0.0);
 }
 
-// Makes the reflected part of a main path a branch; true if path n follows it.
-bool branch(inout Path path, uint line, uint n, uint key, float reflectance) {
-    float wanted = clamp(ceil(float(frame.paths) * reflectance), 1.0, float(frame.paths));
-    // Russian roulette: the fainter a branch, the more rarely it is followed, with as much more weight.
-    float level = path.weight * reflectance * rows[row_of(path.time)].compensation;
-    path.survival = level < frame.branch_floor ? max(level / frame.branch_floor, LEAST_SURVIVAL) : 1.0;
-    path.branch = true;
-    path.weight *= reflectance / path.survival;
-    path.probability = path.survival;
-    path.share = 1.0 / wanted;
-    return float(n) < wanted && unit(line_random(line, n, key, PURPOSE_SURVIVAL).x) < path.survival;
-}
-
 // Computes the media behind one or two surfaces that the path has met.
 void toggle(Met here, Met other, vec3 direction, uint copies) {
     copy_media(after, media);
@@ -206,15 +194,6 @@ void transmit(inout Path path, inout Interface at, vec3 n) {
         path.weight = 0.0;
     }
     copy_media(media, after);
-}
-
-// Chooses reflection or transmission at random; true for reflection.
-bool choose(inout Path path, uint n, uint key, float reflectance) {
-    float choice = unit(draw(n, key, PURPOSE_CHOICE).x);
-    if (path.interactions == 1u && !path.branch) choice = (float(n) + choice) / float(frame.paths);
-    bool reflects = choice < reflectance;
-    path.probability *= mix(1.0 - reflectance, reflectance, reflects);
-    return reflects;
 }
 
 void main() {
@@ -411,10 +390,10 @@ void main() {
             if (rough) make_echo(echo, path, line, n, at, m);
             bool can_reflect = rough && path.reflections < frame.max_reflections;
             if (recalled) {
-                reflects = branch(path, line, n, key, at.reflectance) && can_reflect;
+                reflects = branch(path, line, n, key, at) && can_reflect;
                 going = reflects;
             } else {
-                reflects = choose(path, n, key, at.reflectance);
+                reflects = path.branch ? parts(path, line, n, key, at) : choose(path, n, key, at.reflectance);
                 going = can_reflect || !reflects;
             }
         }

@@ -29,6 +29,17 @@ impl Probe {
         (tx.powi(-2) + rx.powi(-2)).sqrt().recip()
     }
 
+    /// Sum of the lateral variances of the transmitted and the received beam at depth `z`, mm^2.
+    pub fn beam_variances(&self, z: f64) -> f64 {
+        let tx = fixed_focus(self.wavelength(), self.f_number_transmit, self.focus, z);
+        tx.powi(2) + (APODISED * self.wavelength() * self.f_number(z)).powi(2)
+    }
+
+    /// Sine of the angle between the axis and what comes from one deviation beside it on the transmitted wavefront.
+    pub fn transmit_sine(&self) -> f64 {
+        (std::f64::consts::TAU * APODISED * self.f_number_transmit).recip()
+    }
+
     /// Sigma across the wavefront at depth `z` that converges on what the image shows two thirds of the way
     /// to its bottom, mm: over this width a surface at `z` refracts. As wide as the receive aperture near the face, as narrow
     /// as a focus at the bottom. A Gaussian aperture whose focus is as wide as that of [`Self::sigma_lateral`].

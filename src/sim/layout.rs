@@ -101,6 +101,12 @@ constants! {
     pub const TRACE_GROUP: u32 = 64;
     /// Smallest probability with which a faint branch is followed.
     pub const LEAST_SURVIVAL: f32 = 1.0 / 32.0;
+    /// Least number of paths that follow what may go to and fro between two faces.
+    pub const TRAIN_PATHS: u32 = 4;
+    /// Cosine between a path and a surface's normal from which on what is reflected may go to and fro.
+    pub const TRAIN_FACING: f32 = 0.95;
+    /// Amplitude, attenuation made up for, from which on a train of echoes is followed on every line.
+    pub const TRAIN_FLOOR: f32 = 5e-4;
 
     /// Curved array.
     pub const KIND_CONVEX: u32 = 0;
@@ -153,8 +159,6 @@ constants! {
     pub const LEAST_PITCH: f32 = 1e-6;
     /// Bands of equal depth in which the losses of main paths are compared.
     pub const APERTURE_BANDS: u32 = 48;
-    /// Work groups that share the nodes of a block of scanlines.
-    pub const APERTURE_GROUPS: u32 = 4;
     /// Rays from the aperture to a target.
     pub const APERTURE_RAYS: u32 = 16;
     /// Scanlines lose alike in a band if no neighbours differ by more nepers.
@@ -256,6 +260,7 @@ shared! {
         tgc: f32, compensation: f32, incoherent_gain: f32, receive_reach: f32,
         black: f32, sigma_wavefront: f32, aperture: f32, strip_lines: f32,
         strip_core: f32, lobe: f32, transmit_half: f32, receive_half: f32,
+        variances: f32, defocus: f32, transmit_sine: f32, unused0: f32,
     }
     /// A straight part of a path inside one medium.
     struct Segment {

@@ -12,7 +12,8 @@ use super::line::OneLine;
 use super::pass::{Extent, Pass, Sizes, Variants};
 use super::shaders::Library;
 use super::stages::{
-    self, APERTURE, CONVERT, DARKEN, EXPECT, FUSE, MASK, ORIGIN, SCATTER, SHADOW, TRACE, scatter,
+    self, APERTURE, CONVERT, DARKEN, EXPECT, FUSE, MASK, ORIGIN, SCATTER, SHADOW, TRACE, aperture,
+    scatter,
 };
 use super::tables::Tables;
 use super::{SimError, World};
@@ -212,6 +213,14 @@ impl Passes {
         }
     }
 
+    /// Records what the aperture lets through, of `apertures` or what is bound instead.
+    fn converge(&self, cmd: &mut Commands, instead: Instead<'_>) -> Result<(), GpuError> {
+        cmd.scope(APERTURE.name);
+        let [threads, ..] = self.kernels.of(&APERTURE, self.world.deforms()).local_size();
+        let groups = aperture::extent(self.frame(), self.batches.rounds.at_once / threads);
+        self.record(cmd, &APERTURE, groups, &[], instead)
+    }
+
     /// Traces a batch of paths; `turn` is that of [`super::rounds::Rounds::of`].
     fn trace(&self, cmd: &mut Commands, path_begin: u32, turn: &mut u32) -> Result<(), GpuError> {
         if path_begin > 0 {
@@ -225,7 +234,7 @@ impl Passes {
         for round in self.batches.rounds.of(self.frame(), path_begin..path_end, turn) {
             // Behind the main paths of all lines, in front of what echoes there.
             if converges && round.role == ROLE_BRANCHES {
-                self.run(cmd, &APERTURE)?;
+                self.converge(cmd, &|_| Vec::new())?;
                 cmd.scope("trace");
                 converges = false;
             }
@@ -248,9 +257,7 @@ impl Passes {
         if fusion.background_shadows {
             self.run(cmd, &SHADOW)?;
             if self.loses_by_aperture() {
-                self.run_with(cmd, &APERTURE, &|lane| {
-                    vec![("apertures", &lane.buffers["shades"])]
-                })?;
+                self.converge(cmd, &|lane| vec![("apertures", &lane.buffers["shades"])])?;
             }
             self.run(cmd, &DARKEN)?;
             prescan = "shaded";

@@ -22,7 +22,7 @@ pub use shadow::{DARKEN, SHADOW};
 pub use tint::TINT;
 pub use trace::TRACE;
 
-mod aperture;
+pub mod aperture;
 mod axial;
 mod beam;
 pub mod blur;

@@ -242,6 +242,10 @@ pub fn rows(scene: &Scene) -> Vec<layout::Row> {
                 lobe: scene.probe.lobe(z) as f32,
                 transmit_half: (scene.probe.converging_aperture(z) / 2.0) as f32,
                 receive_half: (scene.probe.receive_aperture(z) / 2.0) as f32,
+                variances: scene.probe.beam_variances(z) as f32,
+                defocus: (scene.probe.transmit_sine() * (scene.probe.focus - z)) as f32,
+                transmit_sine: scene.probe.transmit_sine() as f32,
+                ..layout::Row::default()
             }
         })
         .collect()

@@ -3,13 +3,13 @@
 use std::f64::consts::FRAC_2_SQRT_PI;
 
 use glam::{DAffine3, DVec3};
-use insonify::scene::Scene;
+use insonify::probe::Kind;
+use insonify::scene::{Keyframes, Scene, shapes};
 
 use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};
-use crate::contrast::region;
 use crate::moments::{mean, signal_to_noise};
-use crate::scenes::{add_box, silent};
-use crate::speckle::{homogeneous, sigma_lateral};
+use crate::scenes::{add_body, add_box, silent};
+use crate::speckle::{homogeneous, intensities, sigma_lateral};
 
 /// Check T14.
 pub fn a_border_along_the_beam_is_as_wide_as_the_beam() -> Check {
@@ -18,25 +18,89 @@ pub fn a_border_along_the_beam_is_as_wide_as_the_beam() -> Check {
         name: "a_border_along_the_beam_is_as_wide_as_the_beam",
         claim: "Across the side of an anechoic body, along the beam, mean intensity falls as the part of a Gaussian \
             beam that lies outside: 1/2 erfc(x / sigma), from 90 to 10 % over 1.81 sigma, 0.77 of the full width at \
-            half of the intensity's lateral autocovariance, 2.355 sigma. 20 %, of which chance makes 5 %.",
+            half of the intensity's lateral autocovariance, 2.355 sigma: lines side by side, in a fan, in a sector, and \
+            where tissue has been deformed. 20 %, of which chance makes 5 %.",
         planted: "Lines that take the tissue from their axes alone: a border one scanline sharp.",
         run: borders,
     }
 }
 
-/// Depths, mm, between which lines are averaged: inside the body.
-const DEPTHS: [f64; 2] = [32.0, 88.0];
-const SEEDS: u32 = 6;
 /// From 90 to 10 % of erfc(x) / 2.
 const FALL: f64 = 1.812;
 
+/// A probe, the depths between which lines are averaged, mm, inside the body, and the number of images.
+struct Case {
+    what: &'static str,
+    kind: Kind,
+    lines: u32,
+    f_number: f64,
+    depths: [f64; 2],
+    /// True if the tissue beside the body is that of a mesh that has been deformed.
+    deformed: bool,
+    seeds: u32,
+}
+
+const LINEAR: Case = Case {
+    what: "lines 0.1 mm apart, F/2",
+    kind: Kind::Linear { width: 8.0 },
+    lines: 80,
+    f_number: 2.0,
+    depths: [32.0, 88.0],
+    deformed: false,
+    seeds: 6,
+};
+
+const CASES: [Case; 6] = [
+    LINEAR,
+    Case { what: "lines 0.25 mm apart, F/2", lines: 32, ..LINEAR },
+    Case { what: "lines 0.25 mm apart, F/4", lines: 32, f_number: 4.0, ..LINEAR },
+    Case { what: "deformed tissue, F/2", deformed: true, ..LINEAR },
+    Case {
+        what: "convex, F/2",
+        kind: Kind::Convex { radius: 50.0, field_of_view: 0.1 },
+        lines: 64,
+        depths: [50.0, 70.0],
+        seeds: 12,
+        ..LINEAR
+    },
+    Case {
+        what: "phased, F/2",
+        kind: Kind::Phased { field_of_view: 0.2 },
+        lines: 80,
+        depths: [50.0, 70.0],
+        seeds: 12,
+        ..LINEAR
+    },
+];
+
 /// Speckle beside a silent body that begins at x = 0 and has the same impedance and speed: no surface echoes, nothing
 /// refracts.
-fn beside_a_body(pitch: f64, f_number: f64, seed: u32) -> Scene {
-    let mut scene = homogeneous((8.0 / pitch) as u32, pitch, seed);
-    scene.probe.f_number_receive = f_number;
-    let at = DAffine3::from_translation(DVec3::new(25.0, 5.3, 25.0));
-    add_box(&mut scene, [50.0, 50.0, 70.0], silent(1.540, 1.630, 0.0), at);
+fn beside_a_body(case: &Case, seed: u32) -> Scene {
+    let mut scene = homogeneous(case.lines, 0.1, seed);
+    scene.probe.kind = case.kind;
+    scene.probe.f_number_receive = case.f_number;
+    let quiet = silent(1.540, 1.630, 0.0);
+    if !case.deformed {
+        let at = DAffine3::from_translation(DVec3::new(25.0, 5.3, 25.0));
+        add_box(&mut scene, [50.0, 50.0, 70.0], quiet, at);
+        return scene;
+    }
+    // The body is what lies around the tissue, whose side at x = 0 stays there.
+    let tissue = std::mem::replace(&mut scene.tissues[0], quiet);
+    let at = DAffine3::from_translation(DVec3::new(-25.0, 5.3, 60.0));
+    let rest = shapes::cuboid([50.0, 50.0, 70.0]);
+    let mut bent = rest.clone();
+    for [x, y, z] in &mut bent.positions {
+        (*x, *y, *z) = (25.0 + 1.15 * (*x - 25.0), 0.95 * *y + 0.1 * *z, 0.9 * *z);
+    }
+    add_body(&mut scene, rest, tissue, at);
+    scene.meshes.push(bent.into());
+    scene.instances[0].mesh = 1;
+    scene.instances[0].keyframes = Keyframes {
+        meshes: vec![0, 1],
+        blend: [(1, 1.0), (0, 0.0), (0, 0.0), (0, 0.0)],
+        ..Keyframes::default()
+    };
     scene
 }
 
@@ -70,19 +134,21 @@ fn borders(bench: &Bench, physics: Physics) -> Outcome {
     let mut out = Outcome::default();
     let (name, render) = &bench.renderers[1];
     let mut curves = Vec::new();
-    for (pitch, f_number) in [(0.1, 2.0), (0.25, 2.0), (0.25, 4.0)] {
-        let mut lines = Vec::new();
+    for case in &CASES {
+        let middle = f64::midpoint(case.depths[0], case.depths[1]);
+        let scene = beside_a_body(case, 0);
+        let pitch = scene.probe.line_pitch(middle);
+        let across = |l: u32| (f64::from(l) + 0.5 - f64::from(case.lines) / 2.0) * pitch;
+        let mut lines: Vec<[f64; 2]> = (0..case.lines).map(|l| [across(l), 0.0]).collect();
         let mut tissue = Vec::new();
-        for seed in 0..SEEDS {
-            let scene = beside_a_body(pitch, f_number, seed);
-            let frame = render(&scene);
-            tissue.extend(region(&frame, &scene, [-4.0, -1.5], DEPTHS));
-            lines.resize((8.0 / pitch) as usize, [0.0; 2]);
-            for (l, line) in (0..).zip(&mut lines) {
-                let x = scene.probe.ray(l, 0).0.x;
-                line[0] = x;
-                line[1] +=
-                    mean(&region(&frame, &scene, [x - 0.01, x + 0.01], DEPTHS)) / f64::from(SEEDS);
+        for seed in 0..case.seeds {
+            let frame = render(&beside_a_body(case, seed));
+            for (line, powers) in lines.iter_mut().zip(intensities(&frame, &scene, case.depths, 1))
+            {
+                line[1] += mean(&powers) / f64::from(case.seeds);
+                if (-4.0..-1.5).contains(&line[0]) {
+                    tissue.extend(powers);
+                }
             }
         }
         let whole = mean(&tissue);
@@ -92,20 +158,18 @@ fn borders(bench: &Bench, physics: Physics) -> Outcome {
         if physics == Physics::Planted {
             near.iter_mut().for_each(|point| point[1] = f64::from(point[0] < 0.0));
         }
-        let scene = beside_a_body(pitch, f_number, 0);
-        let sigma = sigma_lateral(&scene, 60.0);
-        let what = format!("{name}: from 90 to 10 %, lines {pitch} mm apart, F/{f_number}; mm");
+        let sigma = sigma_lateral(&scene, middle);
+        let what = format!("{name}: from 90 to 10 %, {}; mm", case.what);
         out.compare(what, FALL * fitted(&near), FALL * sigma, 0.2 * FALL * sigma);
-        let what =
-            format!("{name}: mean / deviation beside it, lines {pitch} mm apart, F/{f_number}");
+        let what = format!("{name}: mean / deviation beside it, {}", case.what);
         let envelopes: Vec<f64> = tissue.iter().map(|i| i.sqrt()).collect();
         out.compare(what, signal_to_noise(&envelopes), 1.913, 0.05)
             .unlike("that of intensities", 1.0);
         curves.push(Curve::line(
-            format!("1/2 erfc(x / sigma), F/{f_number}"),
+            format!("1/2 erfc(x / sigma), {}", case.what),
             (-40..=40).map(|i| 0.05 * f64::from(i)).map(|x| [x, outside(x / sigma)]).collect(),
         ));
-        curves.push(Curve::dots(format!("lines {pitch} mm apart, F/{f_number}"), near));
+        curves.push(Curve::dots(case.what.to_owned(), near));
     }
     let axes = ["lateral position, mm", "mean intensity"];
     out.plots.push(Plot::linear("The side of an anechoic body", axes, curves));

@@ -1,7 +1,7 @@
 //! Brightness behind interfaces: it belongs to the anatomy, not to the number of paths.
 
 use insonify::scene::Scene;
-use insonify::settings::Sampling;
+use insonify::settings::{Loss, Sampling};
 use insonify::sim::Tracer;
 
 use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};
@@ -47,6 +47,8 @@ fn load(lines: u32) -> (&'static str, Scene) {
     .map(|(key, value)| (key.to_owned(), value));
     let (mut scene, _) = Scene::load(&root.join(file), &smaller).expect(file);
     scene.imaging.noise = f64::NEG_INFINITY;
+    // Independent paths lose what they meet, which the aperture of one main path does not.
+    scene.simulation.loss = Loss::Ray;
     (name, scene)
 }
 

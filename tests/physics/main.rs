@@ -51,3 +51,4 @@ mod stages;
 mod sweep;
 mod thickness;
 mod timing;
+mod vessel;

@@ -23,7 +23,7 @@ const AROUND: f64 = 1.540;
 const SIDES: u32 = 768;
 
 /// A cylinder along y with the cylinder's own normals, ends left open beyond the slice.
-fn tube() -> Mesh {
+pub fn tube() -> Mesh {
     let mut mesh = Mesh { name: "tube".into(), ..Mesh::default() };
     for i in 0..SIDES {
         let (sin, cos) = (TAU * (f64::from(i) + 0.3) / f64::from(SIDES)).sin_cos();

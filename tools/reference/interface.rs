@@ -36,7 +36,7 @@ pub(super) struct Interface {
     /// Normal of the triangle.
     pub(super) geometric: DVec3,
     /// Normal interpolated from the vertices.
-    shading: DVec3,
+    pub(super) shading: DVec3,
     /// Normal averaged over the wavefront, by which the path refracts.
     pub(super) refracting: DVec3,
     /// Change of `refracting` per mm across the path, in the image plane; 0 in geometric acoustics.

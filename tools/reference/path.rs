@@ -14,6 +14,9 @@ const PURPOSE_DITHER: u32 = 0x51ed_270b;
 /// Purpose of the random number that decides whether a faint branch is followed.
 pub(super) const PURPOSE_SURVIVAL: u32 = 0x2545_f491;
 
+/// Purpose of the random number that decides how many paths of a group are reflected.
+pub(super) const PURPOSE_PARTS: u32 = 0x85eb_ca6b;
+
 /// The origin of a path, and its continuation at interactions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Role {
@@ -53,6 +56,8 @@ pub(super) struct Path {
     pub(super) strip: [f64; 2],
     /// Probability with which it was followed; its weight is divided by it.
     pub(super) survival: f64,
+    /// First and number of the paths that have come the same way.
+    pub(super) group: [u32; 2],
     pub(super) stack: Stack,
     pub(super) t_min: f64,
     /// True for a main path behind a surface that lets hardly anything through.
@@ -74,7 +79,7 @@ impl Path {
 
     /// The numbers added before rounding down: for each sample of a deposit, real and imaginary part.
     pub(super) fn dither(&self, frame: &Frame) -> [f64; 8] {
-        let words = self.line_random(frame, PURPOSE_DITHER);
+        let words = self.line_random(frame, self.n, PURPOSE_DITHER);
         std::array::from_fn(|i| {
             let word = words[i / 2];
             let half = if i % 2 == 0 { word >> 16 } else { word & 0xffff };
@@ -82,11 +87,12 @@ impl Path {
         })
     }
 
-    /// Random numbers of the line's interaction just reached, for decisions that neighbouring lines must not share.
-    pub(super) fn line_random(&self, frame: &Frame, purpose: u32) -> [u32; 4] {
+    /// Random numbers of path `n` at the line's interaction just reached, for decisions that neighbouring lines must not
+    /// share.
+    pub(super) fn line_random(&self, frame: &Frame, n: u32, purpose: u32) -> [u32; 4] {
         let (l, layer) = self.scanline(frame.scanlines);
         let on_face = layer * frame.face_lines() + frame.first_line + l;
-        pcg4d([on_face, self.n, self.key(), frame.seed ^ purpose])
+        pcg4d([on_face, n, self.key(), frame.seed ^ purpose])
     }
 
     /// Scanline and layer.

@@ -276,6 +276,19 @@ impl<'a> Tube<'a> {
         1.0 + (0.5 * off * off).min(MOST_WIDENED.into())
     }
 
+    /// Power of speckle at distance `x` over that behind even surfaces: of beams whose intensities are Gaussians it goes by
+    /// the root of the sum of their variances. What comes from one deviation of the aperture misses the axis by `off` on the
+    /// received beam; on the transmitted one it was `defocus` beside it and is `moved` farther.
+    pub(super) fn spoiled(&self, x: f64, row: &Row) -> f64 {
+        let [a, b, c] = self.segment.lens;
+        let (off, turn) = (a + x * (b + x * c), b + 2.0 * x * c);
+        let defocus = f64::from(row.defocus);
+        let aperture = f64::from(row.aperture);
+        let moved = turn / 2.0 * defocus / aperture + off * f64::from(row.transmit_sine) / aperture;
+        let more = off.powi(2) + (defocus + moved).powi(2) - defocus.powi(2);
+        (1.0 + (more / f64::from(row.variances)).min(MOST_WIDENED.into())).sqrt().recip()
+    }
+
     /// Distance of the neighbouring scanlines' paths at distance `x`, over that of the scanlines, with its limits.
     fn ratio(&self, x: f64) -> f64 {
         let [pitch, growth] = line_pitch(self.world.frame);
@@ -333,8 +346,8 @@ impl<'a> Tube<'a> {
         let across = from.dot(self.lateral).abs() / (half * ratio);
         let share = strip_share(row, across);
         let up = self.layer_offset + from.dot(self.elevation);
-        // A wider strip has more scatterers; behind a lens each is fainter by as much as it would be wider.
-        let fainter = ratio.sqrt() * self.widened(from.dot(self.direction), row).powf(0.25);
+        // A wider strip has more scatterers.
+        let fainter = ratio.sqrt() / self.spoiled(from.dot(self.direction), row).sqrt();
         share * (-0.5 * up * up * falling).exp() / fainter
     }
 

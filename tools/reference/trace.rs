@@ -2,20 +2,23 @@
 
 use glam::{DAffine3, DVec3};
 
-use super::aperture::{UNKNOWN, loses_by_aperture, lost_of, nepers, place, time_of};
 use super::geometry::{face, line_pitch, world_line};
 use super::interface::{self, Interface};
-use super::path::{PURPOSE_SURVIVAL, Path, Role, reflect, step, widen};
-use super::random::{PURPOSE_CHOICE, PURPOSE_JITTER, draw, gaussian, unit};
+use super::path::{Path, Role, reflect, step};
+use super::random::{PURPOSE_JITTER, draw, gaussian, unit};
 use super::stack::Stack;
 use super::straight::{Start, Toggled};
 use super::world::{World, affine};
 use super::{Accumulator, Segment, acoustics};
 use insonify::sim::layout::{
-    APERTURE_BANDS, Counters, FLAG_FACE_REFLECTION, FLAG_ROUGH_TRANSMISSION, HARDLY_PASSED,
-    LEAST_MAIN, LEAST_PASSED, LEAST_PITCH, LEAST_SURVIVAL, OTHER_SPEED, SAMPLING_MAIN_PATH,
-    SAMPLING_SHARED_PRIMARY, STRIP_LIMIT,
+    Counters, FLAG_FACE_REFLECTION, FLAG_ROUGH_TRANSMISSION, Frame, LEAST_MAIN, LEAST_PASSED,
+    LEAST_PITCH, SAMPLING_MAIN_PATH, SAMPLING_SHARED_PRIMARY, STRIP_LIMIT,
 };
+
+mod branches;
+mod losses;
+
+pub use losses::losses;
 
 /// The results of `trace`.
 #[derive(Clone, Debug)]
@@ -38,23 +41,6 @@ struct Tracer<'a> {
     /// The next node that a main path reaches.
     node: u32,
     out: Traced,
-}
-
-/// Nepers that the main paths lose, by layer, node and scanline; none where losses do not count by the aperture.
-pub fn losses(world: &World, starts: &[Start]) -> Vec<f64> {
-    let frame = world.frame;
-    let lines = frame.layers * frame.scanlines;
-    if !loses_by_aperture(frame) {
-        return Vec::new();
-    }
-    let mut tracer = Tracer::new(world, vec![0.0; (lines * (APERTURE_BANDS + 1)) as usize]);
-    tracer.ahead = true;
-    for line in 0..lines {
-        tracer.node = 0;
-        let path = tracer.start(line, 0, &starts[line as usize]);
-        tracer.follow(path);
-    }
-    tracer.out.lost
 }
 
 /// Follows all paths of all lines from their starts.
@@ -131,6 +117,7 @@ impl<'a> Tracer<'a> {
                 [pitch + begin.travelled * growth, growth]
             },
             survival: 1.0,
+            group: [0, 1],
             stack: begin.media.clone(),
             t_min,
             shadowed: false,
@@ -230,7 +217,8 @@ impl<'a> Tracer<'a> {
                         path.weight *= 1.0 - interface.reflectance;
                         interface.reflectance < 1.0 && self.transmit(&mut path, &interface, after)
                     }
-                    Role::Branch | Role::Single => self.choose(&mut path, &interface, after),
+                    Role::Branch => self.part(&mut path, &interface, after),
+                    Role::Single => self.choose(&mut path, &interface, after),
                 };
                 if !goes_on {
                     return;
@@ -238,60 +226,6 @@ impl<'a> Tracer<'a> {
             }
         }
         self.lose_no_more(&path);
-    }
-
-    /// True for a main path that goes on where its own beam is dark.
-    fn is_steady(&self, path: &Path) -> bool {
-        path.role == Role::Main && loses_by_aperture(self.world.frame)
-    }
-
-    /// True for a main path at a surface that lets hardly anything through.
-    fn is_hidden(&self, path: &Path, interface: &Interface) -> bool {
-        self.is_steady(path) && interface.reflectance > 1.0 - f64::from(HARDLY_PASSED)
-    }
-
-    /// True for a shadowed path in a medium of another speed than tissue, past which others reach.
-    fn is_passed_by(&self, path: &Path, speed: f64) -> bool {
-        let assumed = f64::from(self.world.frame.speed);
-        path.shadowed && (speed - assumed).abs() > f64::from(OTHER_SPEED) * assumed
-    }
-
-    /// A main path with the weight of the whole beam where it is.
-    fn whole(&self, path: &Path) -> Path {
-        let mut whole = path.clone();
-        if self.is_steady(path) && !self.ahead {
-            let table = |at: usize| [self.world.apertures[at][0].into(), self.out.lost[at]];
-            let lost = lost_of(path.weight);
-            whole.weight *= nepers(self.world.frame, table, path.line, path.time, lost).exp();
-        }
-        whole
-    }
-
-    /// Notes what a main path loses in its medium up to a time at the nodes that it reaches before.
-    fn lose(&mut self, path: &Path, until: f64) {
-        let (tissue, _) = self.world.medium(&path.stack);
-        let absorption = f64::from(self.world.tissues[tissue as usize].absorption);
-        self.note(path, Some(absorption * self.speed(path)), until);
-    }
-
-    /// Notes that a main path has ended; one without a weight was not followed.
-    fn lose_no_more(&mut self, path: &Path) {
-        self.note(path, (path.weight > 0.0).then_some(0.0), f64::INFINITY);
-    }
-
-    fn note(&mut self, path: &Path, rate: Option<f64>, until: f64) {
-        let frame = self.world.frame;
-        if !self.ahead {
-            return;
-        }
-        while self.node <= APERTURE_BANDS && time_of(frame, self.node) < until {
-            let way = time_of(frame, self.node) - path.time;
-            let at = place(frame, path.line, self.node);
-            let followed = rate.filter(|_| way >= 0.0);
-            self.out.lost[at] = followed
-                .map_or(UNKNOWN, |rate| (lost_of(path.weight) + rate * way).min(lost_of(0.0)));
-            self.node += 1;
-        }
     }
 
     /// True if the path gives no more echoes: it is outside of all masks, and neither a mask nor
@@ -374,60 +308,6 @@ impl<'a> Tracer<'a> {
         path.t_min = step(path.origin);
     }
 
-    /// Follows the reflected part that main-path sampling splits off, to its end.
-    fn branch(&mut self, main: &Path, interface: &Interface) {
-        let frame = self.world.frame;
-        let reflects = !self.ahead && main.reflections < frame.max_reflections;
-        let Some(echo) = interface.micro.filter(|_| reflects) else {
-            return;
-        };
-        let (n, big_r) = (f64::from(frame.paths), interface.reflectance);
-        let mut path = Path { role: Role::Branch, shadowed: false, ..main.clone() };
-        let branches = (n * big_r).ceil().clamp(1.0, n);
-        if f64::from(main.n) >= branches {
-            return;
-        }
-        // Russian roulette: the fainter a branch, the more rarely it is followed, with as much more weight.
-        let row = &self.world.rows[self.out.surface.sample(path.time)];
-        let level = path.weight * big_r * f64::from(row.compensation);
-        let floor = f64::from(frame.branch_floor);
-        if level < floor {
-            path.survival = (level / floor).max(f64::from(LEAST_SURVIVAL));
-        }
-        if unit(path.line_random(frame, PURPOSE_SURVIVAL)[0]) >= path.survival {
-            return;
-        }
-        path.weight *= big_r / path.survival;
-        path.probability = path.survival;
-        path.share = 1.0 / branches;
-        reflect(&mut path, echo.reflected, echo.normal);
-        widen(&mut path, interface.roughness, interface.turn);
-        if !self.ended(&path) {
-            self.follow(path);
-        }
-    }
-
-    /// Chooses reflection or transmission at random; true if the path continues.
-    fn choose(&mut self, path: &mut Path, interface: &Interface, after: Stack) -> bool {
-        let frame = self.world.frame;
-        let mut u = unit(draw(frame, path.n, path.key(), PURPOSE_CHOICE)[0]);
-        if path.role == Role::Single && path.interactions == 1 {
-            u = (f64::from(path.n) + u) / f64::from(frame.paths);
-        }
-        if u >= interface.reflectance {
-            path.probability *= 1.0 - interface.reflectance;
-            return self.transmit(path, interface, after);
-        }
-        path.probability *= interface.reflectance;
-        let Some(micro) = interface.micro.filter(|_| path.reflections < frame.max_reflections)
-        else {
-            return false;
-        };
-        reflect(path, micro.reflected, micro.normal);
-        widen(path, interface.roughness, interface.turn);
-        true
-    }
-
     /// Refracts into the next medium; false when the path is lost to total reflection.
     fn transmit(&mut self, path: &mut Path, interface: &Interface, after: Stack) -> bool {
         let rough = self.world.frame.flags & FLAG_ROUGH_TRANSMISSION != 0;
@@ -506,18 +386,19 @@ impl<'a> Tracer<'a> {
         }
         let frame = self.world.frame;
         let unsplit = frame.sampling == SAMPLING_SHARED_PRIMARY && path.interactions == 0;
-        let alike = frame.origin_jitter <= 0.0
-            && frame.emission_lobe <= 0.0
-            && frame.flags & FLAG_ROUGH_TRANSMISSION == 0;
         if !self.world.is_heard(&path.stack) || path.role == Role::Branch && self.is_faint(path) {
             return;
         }
         let (weight, share) = match path.role {
-            _ if !alike => own_share(path),
+            _ if !are_alike(frame) => own_share(path),
             Role::Single if !unsplit => own_share(path),
-            _ if path.n != 0 => return,
-            // Speckle adds in power.
-            _ => (path.weight * path.survival.sqrt(), 1.0),
+            _ if path.n != path.group[0] => return,
+            // Speckle adds in power; the first of a group stands for all of it.
+            Role::Branch => {
+                let power = path.probability * path.share * f64::from(path.group[1]);
+                (path.weight * power.sqrt(), 1.0)
+            }
+            _ => (path.weight, 1.0),
         };
         let strip = self.strip(path, tissue);
         self.out.counters.strips_limited += u32::from(self.is_limited(path, strip, length, tissue));
@@ -539,6 +420,13 @@ impl<'a> Tracer<'a> {
             handedness: path.handedness,
         });
     }
+}
+
+/// True if all paths of a line are equal up to their first reflection.
+fn are_alike(frame: &Frame) -> bool {
+    frame.origin_jitter <= 0.0
+        && frame.emission_lobe <= 0.0
+        && frame.flags & FLAG_ROUGH_TRANSMISSION == 0
 }
 
 /// Weight and share of a path that stands for itself only.

@@ -63,6 +63,7 @@ pub(super) fn middle(frame: &Frame, line: u32, along: Line, begin: &Start) -> Pa
         lens: [0.0; 3],
         strip: [0.0; 2], // not asked for
         survival: 1.0,
+        group: [0, 1],
         stack: begin.media.clone(),
         t_min: if begin.travelled > 0.0 { step(origin) } else { 0.0 },
         shadowed: false,

@@ -1,6 +1,6 @@
 //! `aperture`: what the aperture that converges on a target lets through, of what the scanline's main path alone loses.
 
-use super::super::layout::{APERTURE_BANDS, APERTURE_GROUPS, Frame};
+use super::super::layout::{APERTURE_BANDS, Frame};
 use super::super::pass::{Array, Extent, Pass, Sizes};
 use crate::output::npy::Element::Float;
 
@@ -12,11 +12,22 @@ pub const APERTURE: Pass = Pass {
         // Nepers of gain and of loss, by layer, node and scanline.
         Array::new("apertures", Float, 2, nodes),
     ],
-    extent: Some(|f: &Frame| Extent::Groups([f.scanlines.div_ceil(64), APERTURE_GROUPS, f.layers])),
+    extent: Some(|frame: &Frame| extent(frame, u32::MAX)),
     // Kernels that read nothing of it bind it, too.
     needed: |_| true,
     ..Pass::USUAL
 };
+
+/// Most work groups among which the nodes of 64 scanlines are dealt out.
+const MOST_GROUPS: u32 = 4;
+
+/// Work groups for a device that runs about `at_once` of them at once: each finds out by itself where scanlines differ, so
+/// that more than keep the device busy are slower.
+pub fn extent(frame: &Frame, at_once: u32) -> Extent {
+    let lines = frame.scanlines.div_ceil(64);
+    let groups = at_once / (lines * frame.layers).max(1);
+    Extent::Groups([lines, groups.clamp(1, MOST_GROUPS), frame.layers])
+}
 
 /// The losses of an acquired volume's shadows, for which the stage runs once more.
 pub(super) const SHADES: Array = Array::new("shades", Float, 2, nodes);

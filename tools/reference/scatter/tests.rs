@@ -300,13 +300,40 @@ fn a_lens_dims_speckle_by_what_it_widens_the_beam() {
         let power = mean_power(&mut fixture, &[s]);
         (power, scatter(&fixture.world(), &[s]).deposits)
     };
-    // The variance grows by half the offset's square over that of the beam, 0.16 mm^2.
+    // Both beams, which converge there, have a variance more by 0.96 mm^2; without a lens they add up to 0.64 mm^2.
     let (even, behind) = (
         measured(segment(60.0)),
         measured(Segment { lens: [f64::sqrt(0.96), 0.0, 0.0], ..segment(60.0) }),
     );
     assert!((behind.0 / even.0 - 0.5).abs() < 1e-6, "{} {}", behind.0, even.0);
     assert_eq!(behind.1, even.1);
+}
+
+// A thin lens of power p, `x` in front of a target: a ray turns by p times its distance from the axis. The received beam
+// converges on the target, the transmitted one on its focus, in front of it or behind.
+#[test]
+fn a_thin_lens_moves_both_focuses() {
+    let fixture = Fixture::new(vec![tissue(1.5, 1.5, 0.0)]);
+    let [waist, x, sine, receive] = [0.4_f64, 20.0, 0.08, 0.12];
+    for [power, focus] in [[-0.01_f64, 30.0], [0.01, 30.0], [-0.01, -12.0], [0.02, 0.0]] {
+        // Behind the lens rays of one deviation were this far from the axis there.
+        let transmitted = (sine * (focus + x), sine * focus);
+        let after = transmitted.1 + power * x * transmitted.0;
+        let missed = power * x * receive * x;
+        let variances = waist.powi(2) + transmitted.1.powi(2) + 0.09;
+        let expected = (variances / (waist.powi(2) + after.powi(2) + 0.09 + missed.powi(2))).sqrt();
+        let row = Row {
+            aperture: receive as f32,
+            variances: variances as f32,
+            defocus: transmitted.1 as f32,
+            transmit_sine: sine as f32,
+            ..fixture.rows[0]
+        };
+        let s = Segment { lens: [0.0, 0.0, receive * power], ..segment(60.0) };
+        let world = fixture.world();
+        let got = Tube::new(&world, &s, DAffine3::IDENTITY, None).spoiled(x, &row);
+        assert!((got / expected - 1.0).abs() < 1e-6, "{power} {focus}: {got} {expected}");
+    }
 }
 
 // Where neighbouring paths lie twice as far apart, a line hears twice as many scatterers, each with half the power.

@@ -251,6 +251,52 @@ fn a_slab_reverberates_with_the_exact_series_in_every_sampling() {
     }
 }
 
+// Few paths suffice where all are divided between both ways; of a slab each echo is exact, on every line.
+#[test]
+fn a_few_paths_follow_the_echoes_of_a_slab_on_every_line() {
+    for paths in [5, 8, 32] {
+        let mut fixture = slab();
+        (fixture.frame.scanlines, fixture.frame.width) = (30, 10.0);
+        fixture.frame.paths = paths;
+        let out = run(&fixture);
+        let samples = 2 * fixture.frame.samples as usize;
+        for line in out.surface.exact.chunks(samples) {
+            for m in 0..4 {
+                let expected = 0.75 * -0.5 * 0.25f64.powi(m);
+                let got = echo_of(&fixture, line, 16.0 + 6.0 * f64::from(m));
+                assert!((got / expected - 1.0).abs() < 1e-9, "{paths} {m}: {got} {expected}");
+            }
+        }
+    }
+}
+
+// One path goes one way only. Of n = 4000 lines a quarter has the second echo, a sixteenth the third: the mean's relative
+// deviation is sqrt((1 / p - 1) / n); 4 of those.
+#[test]
+fn a_path_that_draws_draws_for_its_own_line_and_keeps_level_and_power() {
+    let mut fixture = slab();
+    let lines = 4000;
+    (fixture.frame.scanlines, fixture.frame.width) = (lines, 100.0);
+    let out = run(&fixture);
+    let samples = 2 * fixture.frame.samples as usize;
+    for m in 1..4 {
+        let drawn = 0.25f64.powi(m - 1);
+        let bound = 4.0 * ((1.0 / drawn - 1.0) / f64::from(lines)).sqrt() + 1e-9;
+        let expected = 0.75 * -0.5 * 0.25f64.powi(m);
+        let depth = 16.0 + 6.0 * f64::from(m);
+        let echoes = out.surface.exact.chunks(samples).map(|line| echo_of(&fixture, line, depth));
+        let mean = echoes.sum::<f64>() / f64::from(lines);
+        assert!((mean / expected - 1.0).abs() < bound, "{m}: {mean} {expected}");
+        // The way that ends there, inside the slab, is heard in power.
+        let time = (10.0 + 6.0 * f64::from(m)) / 1.5;
+        let inside = |s: &&Segment| s.tissue == 1 && (s.time - time).abs() < 1e-6;
+        let power: f64 =
+            out.segments.iter().flatten().filter(inside).map(|s| s.weight.powi(2)).sum();
+        let whole = (0.75 * 0.25f64.powi(m)).powi(2);
+        assert!((power / f64::from(lines) / whole - 1.0).abs() < bound, "{m}: {power}");
+    }
+}
+
 #[test]
 fn samplings_choose_which_segments_speak_for_a_path() {
     let mut fixture = slab();
