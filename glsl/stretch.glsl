@@ -119,13 +119,13 @@ float strip_ratio(Stretch s, float x) {
 // The factor on the power of speckle at distance x: where two beams whose intensities are Gaussians meet it is 1 over the root of
 // the sum of their variances. A surface that bends the wavefront makes them wider, or narrower: the received beam, which
 // converges on x, misses it by the offset; the transmitted one, narrower or wider than that where it passed the surface, is as
-// much closer to its focus or farther from it.
+// much closer to its focus or farther from it. Never brighter: a lens that would mend the focus is too small to have all of the beam.
 float spoiled(Stretch s, float x, uint row) {
     float off = offset_at(s, vec3(x)).x, turn = s.lens.y + 2.0 * x * s.lens.z;
     float defocus = rows[row].defocus;
     float moved = (0.5 * turn * defocus + off * rows[row].transmit_sine) / rows[row].aperture;
     float more = off * off + moved * (moved + 2.0 * defocus);
-    return inversesqrt(1.0 + min(more / rows[row].variances, MOST_WIDENED));
+    return inversesqrt(1.0 + clamp(more / rows[row].variances, 0.0, MOST_WIDENED));
 }
 
 // The same on the amplitude of a scatterer.

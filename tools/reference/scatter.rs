@@ -278,7 +278,8 @@ impl<'a> Tube<'a> {
 
     /// Power of speckle at distance `x` over that behind even surfaces: of beams whose intensities are Gaussians it goes by
     /// the root of the sum of their variances. What comes from one deviation of the aperture misses the axis by `off` on the
-    /// received beam; on the transmitted one it was `defocus` beside it and is `moved` farther.
+    /// received beam; on the transmitted one it was `defocus` beside it and is `moved` farther. A lens that would mend the focus is
+    /// too small to have all of the beam.
     pub(super) fn spoiled(&self, x: f64, row: &Row) -> f64 {
         let [a, b, c] = self.segment.lens;
         let (off, turn) = (a + x * (b + x * c), b + 2.0 * x * c);
@@ -286,7 +287,7 @@ impl<'a> Tube<'a> {
         let aperture = f64::from(row.aperture);
         let moved = turn / 2.0 * defocus / aperture + off * f64::from(row.transmit_sine) / aperture;
         let more = off.powi(2) + (defocus + moved).powi(2) - defocus.powi(2);
-        (1.0 + (more / f64::from(row.variances)).min(MOST_WIDENED.into())).sqrt().recip()
+        (1.0 + (more / f64::from(row.variances)).clamp(0.0, MOST_WIDENED.into())).sqrt().recip()
     }
 
     /// Distance of the neighbouring scanlines' paths at distance `x`, over that of the scanlines, with its limits.
