@@ -161,8 +161,14 @@ fn trunk(lie: &Lie) -> Vec<Measured> {
         let edge = |from: DVec2, to: DVec2| picture.edge_of_tissue(from, to);
         let [near, far] = [-12.0, 12.0].map(|out| edge(beside(0.0, out), beside(0.0, 0.25 * out)));
         let middle = near.midpoint(far).y - DEPTH;
-        let [left, right] =
-            [-12.0, 12.0].map(|out| edge(beside(out, middle), beside(0.25 * out, middle)));
+        // Of three ways the one between the others: a dark grain at the edge would be taken for fluid.
+        let side = |out: f64| {
+            let mut marks = [-0.8, 0.0, 0.8]
+                .map(|up| edge(beside(out, middle + up), beside(0.25 * out, middle + up)).x);
+            marks.sort_by(f64::total_cmp);
+            beside(marks[1], middle)
+        };
+        let [left, right] = [-12.0, 12.0].map(side);
         named(Kind::Ellipse, vec![left, right, near], "AC")
     };
     pictures(lie).iter().map(one).collect()

@@ -81,8 +81,11 @@ fn layers(sampling: Sampling) -> Scene {
     add_point(&mut scene, [0.0, 500.0, 10.0], 1.0);
     scene.probe.samples = 256;
     scene.simulation.sampling = sampling;
-    scene.simulation.paths = 64;
-    // Nothing ends early except beyond counting.
+    // A branch's segments carry the root of what was drawn, as speckle adds in power: of so many paths enough take either
+    // way for next to nothing to be drawn.
+    scene.simulation.paths = if sampling == Sampling::MainPath { 1024 } else { 64 };
+    // Nothing ends early except beyond counting, and no branch is followed by chance.
+    scene.simulation.branch_floor = f64::NEG_INFINITY;
     scene.simulation.max_interactions = 60;
     scene.simulation.max_reflections = 40;
     scene.simulation.min_weight = 1e-9;
