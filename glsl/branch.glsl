@@ -1,4 +1,4 @@
-// Where paths of trace.comp part at a surface: what is reflected off a main path, and what a path does there by chance.
+// The parting of trace.comp's paths at a surface: what is reflected off a main path, and what a path does there by chance.
 //
 // The includer declares frame, rows[] and row_of, and includes path.glsl, emit.glsl and interface.glsl.
 

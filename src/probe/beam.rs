@@ -13,6 +13,11 @@ fn fixed_focus(wavelength: f64, f_number: f64, focus: f64, z: f64) -> f64 {
     waist * (1.0 + ((z - focus) / rayleigh).powi(2)).sqrt()
 }
 
+/// Sine of the angle between the axis and what comes from one deviation beside it on an apodised wavefront.
+fn sine(f_number: f64) -> f64 {
+    (std::f64::consts::TAU * APODISED * f_number).recip()
+}
+
 impl Probe {
     /// Axial sigma_z of the two-way envelope in depth, mm: c sqrt(2 ln 2) / (2 pi B f0).
     pub fn sigma_axial(&self) -> f64 {
@@ -23,21 +28,26 @@ impl Probe {
 
     /// Lateral two-way sigma at depth `z`, mm: fixed transmit focus times dynamic receive focus.
     pub fn sigma_lateral(&self, z: f64) -> f64 {
+        let [tx, rx] = self.one_way(z);
+        (tx.powi(-2) + rx.powi(-2)).sqrt().recip()
+    }
+
+    /// Lateral sigmas of the transmitted and the received beam at depth `z`, mm.
+    fn one_way(&self, z: f64) -> [f64; 2] {
         let lambda = self.wavelength();
         let tx = fixed_focus(lambda, self.f_number_transmit, self.focus, z);
-        let rx = APODISED * lambda * self.f_number(z);
-        (tx.powi(-2) + rx.powi(-2)).sqrt().recip()
+        [tx, APODISED * lambda * self.f_number(z)]
     }
 
     /// Sum of the lateral variances of the transmitted and the received beam at depth `z`, mm^2.
     pub fn beam_variances(&self, z: f64) -> f64 {
-        let tx = fixed_focus(self.wavelength(), self.f_number_transmit, self.focus, z);
-        tx.powi(2) + (APODISED * self.wavelength() * self.f_number(z)).powi(2)
+        let [tx, rx] = self.one_way(z);
+        tx.powi(2) + rx.powi(2)
     }
 
     /// Sine of the angle between the axis and what comes from one deviation beside it on the transmitted wavefront.
     pub fn transmit_sine(&self) -> f64 {
-        (std::f64::consts::TAU * APODISED * self.f_number_transmit).recip()
+        sine(self.f_number_transmit)
     }
 
     /// Sigma across the wavefront at depth `z` that converges on what the image shows two thirds of the way
@@ -51,7 +61,7 @@ impl Probe {
     /// Sine of the angle between the axis and what comes from one deviation beside it on the wavefront of
     /// [`Self::sigma_wavefront`].
     pub fn wavefront_aperture(&self, z: f64) -> f64 {
-        (std::f64::consts::TAU * APODISED * self.f_number(self.target(z))).recip()
+        sine(self.f_number(self.target(z)))
     }
 
     /// Decrease of the amplitude of a small mirror at depth `z` that is tilted: e to the power of minus this times the
@@ -61,7 +71,6 @@ impl Probe {
     /// under a smaller angle.
     pub fn lobe(&self, z: f64) -> f64 {
         let transmitted = self.f_number_transmit * (z / self.focus).max(1.0);
-        let sine = |f_number: f64| (std::f64::consts::TAU * APODISED * f_number).recip();
         (2.0 * (sine(transmitted).powi(2) + sine(self.f_number(z)).powi(2))).recip()
     }
 

@@ -1,6 +1,6 @@
 //! The fetus measured on images of it: marks where an examiner sees the edges.
 //!
-//! The examiner waits until the fetus lies as it should; here it is laid so. Each measurement is taken on nine images
+//! The examiner waits until the fetus lies as it should; here it is laid so. Each measurement is taken on [`IMAGES`]
 //! with speckle of their own, of which the worksheet takes the mean. Sizes are those that the model was made with. The
 //! femur is left out: its 7 mm are a few resolution cells, and its ends fade into the tissue around it.
 

@@ -181,38 +181,35 @@ fn train(bench: &Bench, physics: Physics) -> Outcome {
         let step = 40.0 * r.log10() - absorbed;
         for (name, render) in &bench.renderers {
             let image = render(&scene);
-            let level = |line: usize, m: i32| {
-                let depth = front + f64::from(m + 1) * thickness * FRONT[1] / speed;
-                let at = (depth / pitch) as usize;
-                let reach = (1.0 / pitch) as usize;
-                let envelope = image.envelope(line);
-                let peak = envelope[at - reach..at + reach].iter().copied().fold(1e-12, f64::max);
-                20.0 * peak.log10()
+            let levels = |l: usize| {
+                let envelope = image.envelope(l);
+                [0, 1, 2, 3].map(|m| {
+                    let depth = front + f64::from(m + 1) * thickness * FRONT[1] / speed;
+                    let (at, reach) = ((depth / pitch) as usize, (1.0 / pitch) as usize);
+                    let peak = envelope[at - reach..at + reach].iter().copied();
+                    20.0 * peak.fold(1e-12, f64::max).log10()
+                })
             };
+            let lines: Vec<[f64; 4]> = (0..scene.probe.scanlines as usize).map(levels).collect();
+            let mut points = Vec::new();
             for m in 1..=3 {
-                let mut found: Vec<f64> = (0..scene.probe.scanlines as usize)
-                    .map(|l| level(l, m) - level(l, 0))
-                    .collect();
+                let mut found: Vec<f64> = lines.iter().map(|line| line[m] - line[0]).collect();
                 found.sort_by(f64::total_cmp);
-                let expected = f64::from(m) * step;
-                let amiss = found.iter().filter(|x| (**x - expected).abs() > 2.0).count();
+                let expected = m as f64 * step;
                 // The first needs no reflection after the one at the back.
                 if m > 1 {
+                    let amiss = found.iter().filter(|x| (**x - expected).abs() > 2.0).count();
                     let part = amiss as f64 / found.len() as f64;
                     let what = format!("{name}, {paths} paths: part of the lines without echo {m}");
                     out.compare(what, part, 0.0, 0.1);
                 }
-                let point = [f64::from(m), found[found.len() / 2]];
-                let label = format!("{name}, {paths} paths");
-                match plot.curves.iter_mut().find(|c| c.label == label) {
-                    Some(curve) => curve.points.push(point),
-                    None => plot.curves.push(Curve { label, points: vec![point], line: false }),
-                }
+                points.push([m as f64, found[found.len() / 2]]);
             }
+            plot.curves.push(Curve::dots(format!("{name}, {paths} paths"), points));
         }
         if paths == 8 {
             let points = (1..=3).map(|m| [f64::from(m), f64::from(m) * step]).collect();
-            plot.curves.push(Curve { label: "plane waves".into(), points, line: true });
+            plot.curves.push(Curve::line("plane waves".to_owned(), points));
         }
     }
     out.plots.push(plot);

@@ -1,4 +1,4 @@
-//! Where paths part at a surface: what is reflected off a main path, and what a path does there by chance.
+//! The parting of paths at a surface: what is reflected off a main path, and what a path does there by chance.
 
 use insonify::sim::layout::{LEAST_SURVIVAL, TRAIN_FACING, TRAIN_FLOOR, TRAIN_PATHS};
 

@@ -1,4 +1,4 @@
-//! What the main paths lose on their way, and what of the beam is left where its middle is dark.
+//! Losses of the main paths on their way, and what of the beam is left where its middle is dark.
 
 use insonify::sim::layout::{APERTURE_BANDS, HARDLY_PASSED, OTHER_SPEED};
 
