@@ -120,7 +120,7 @@ float jitter(float h, vec3 e) { return 0.5 * h * dot(abs(e), vec3(1.0)); }
 
 // Echoes of the scatterers of one lattice near a stretch, plane by plane. x: range of the distances of crossed planes
 // that belong to this work. A cell counts if its centre is within the layer's slab; its scatterer, if it is within
-// the strip and within the stretch's ends. The strip's width is that where the axis crosses the plane's middle.
+// the strip and within the stretch's ends. What varies slowly is that of the place where the axis crosses the plane's middle.
 uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
     Lattice lattice = lattice_of(s.tissue, number);
     Walk walk = walk_of(s.d, s.e_l, s.e_e);
@@ -145,6 +145,7 @@ uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
     vec2 slab = slab_of();
     float beside = jitter(h, s.e_l);
     uint span = max(uint(SHAPE_SPAN / frame.sample_pitch), 1u);
+    float mm_per_sample = 1.0 / per_mm;
     ivec3 step_a = unit_step(walk.a), step_b = unit_step(walk.b), step_c = unit_step(walk.c);
 
     uvec3 count = uvec3(0u);
@@ -156,21 +157,25 @@ uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
         float wanted = wanted_level(s.tissue, shape.w, drowned);
         float power = level_power(wanted, number);
         float x_plane = x_middle + ahead;
-        float width = half_width(s, shape, x_plane);
+        float within = clamp(x_plane, 0.0, s.extent);
+        float width = half_width(s, shape, within);
         if (!(power > 0.0) || !(width > 0.0)) continue;
 
         // Over the plane the beam's shape and the gain vary as a parabola through samples on both sides.
         uint below = row - min(row, span), above = min(row + span, frame.samples - 1u);
         float run = per_mm / max(float(above - below), 1.0);
-        vec3 here = shape.xyz, shape_below = rows[below].shape.xyz, shape_above = rows[above].shape.xyz;
+        float ratio = strip_ratio(s, within);
+        vec3 scale = vec3(ratio, 1.0, 1.0);
+        vec3 here = scale * shape.xyz, shape_below = scale * rows[below].shape.xyz, shape_above = scale * rows[above].shape.xyz;
         vec3 slope = (shape_above - shape_below) * run;
         vec3 bend = (shape_above + shape_below - 2.0 * here) * mix(0.0, 2.0 * run * run, above - below == 2u * span);
         // The values of a row belong to the middle of its sample.
-        float row_ahead = (float(row) + 0.5 - kappa_middle) / per_mm;
+        float row_ahead = (float(row) + 0.5 - kappa_middle) * mm_per_sample;
 
-        float core = rows[row].strip_core;
+        vec2 profile = strip_profile(rows[row].strip_core);
         float reach = 1.05 * width + beside;
-        float strength = lattice.amplitude * sqrt(power) * s.weight * thinning(s, x_plane, row) * frame.volume_scale;
+        float strength = lattice.amplitude * sqrt(power / ratio) * s.weight * thinning(s, x_plane, row) * frame.volume_scale;
+        strength *= scattered(s, within, row);
         if (depth > 0.0) {
             strength *= 1.0 + depth * tissue_texture((s.o + x_plane * s.d) / tissues[s.tissue].texture_length, tissues[s.tissue].seed);
         }
@@ -194,18 +199,18 @@ uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
             float dx = dot(rel, s.d);
             float along = x_middle + dx;
             count.x += uint(counts);
-            if (!counts || !present(lattice, bits) || !(along >= 0.0 && along < s.extent)) continue;
-            float across = dot(rel, s.e_l);
-            float up = s.layer_y + dot(rel, s.e_e);
             float off_row = dx - row_ahead;
             vec3 change = off_row * (slope + off_row * bend);
+            float off = abs(dot(rel, s.e_l)) / max(here.x + change.x, LEAST_PITCH);
+            float share = min((1.0 - off) * profile.x, 1.0);
+            // One branch, as many threads of a group have none of it.
+            if (!(counts && present(lattice, bits) && along >= 0.0 && along < s.extent && share > 0.0)) continue;
+            float up = s.layer_y + dot(rel, s.e_e);
             // An echo on a sample has the gain of the sample's row.
-            float off_gain = off_row + 0.5 / per_mm;
+            float off_gain = off_row + 0.5 * mm_per_sample;
             change.z = off_gain * (slope.z + off_gain * bend.z);
-            float share = strip_share(across, here.x + change.x, core, strip_ratio(s, along));
-            if (!(share > 0.0)) continue;
-            float exponent = constant + change.z - falling * dx - (here.y + change.y) * up * up;
-            vec2 v = strength * share * scattered(s, along, row) * exp2(exponent) * phasor(-(turns_middle + dx * turns_per_mm));
+            float exponent = constant + change.z - falling * dx - (here.y + change.y) * up * up - profile.y * off * off;
+            vec2 v = strength * share * exp2(exponent) * phasor(-(turns_middle + dx * turns_per_mm));
             v *= mix(-1.0, 1.0, (bits.z & 1u) == 0u);
             count.y += 1u;
             count.z += deposit_near(kappa_middle + dx * per_mm, v);

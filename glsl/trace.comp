@@ -113,7 +113,6 @@ bool take(uint piece, out uint line, out uint next, out uint last, out uint main
     at -= blocks_before * slots;
     main_path = row * path_count + at / frame.max_interactions;
     slot = row * slots + at;
-    if (!echoes_wanted(line % frame.scanlines)) return false;
     if (at % frame.max_interactions >= interaction_count[main_path]) return false;
     next = interactions[slot].path;
     last = next + 1u;
@@ -233,7 +232,8 @@ void main() {
         if (!alive || guard == guards) {
             if (next >= last || guard == guards) {
                 if (role == ROLE_MAIN && main_path != NONE) {
-                    interaction_count[main_path] = written;
+                    // None follows what a line sends back that is there only for its neighbours.
+                    interaction_count[main_path] = echoes_wanted(line % frame.scanlines) ? written : 0u;
                     if (steady) write_losses(line, node, path, 0.0, FOREVER, path.weight > 0.0);
                 }
                 if (!take_next(quota, line, next, last, main_path, slot)) {

@@ -342,13 +342,13 @@ impl<'a> Tube<'a> {
     }
 
     /// The two-way amplitude of a scatterer off the axis in a strip `half` to either side and as wide as `ratio` says, and a
-    /// beam whose 1 / sigma^2 in elevation is `falling`.
-    fn heard(&self, from: DVec3, row: &Row, ratio: f64, [half, falling]: [f64; 2]) -> f64 {
+    /// beam whose 1 / sigma^2 in elevation is `falling`; lenses weaken it as at distance `x`.
+    fn heard(&self, from: DVec3, x: f64, row: &Row, ratio: f64, [half, falling]: [f64; 2]) -> f64 {
         let across = from.dot(self.lateral).abs() / (half * ratio);
         let share = strip_share(row, across);
         let up = self.layer_offset + from.dot(self.elevation);
         // A wider strip has more scatterers.
-        let fainter = ratio.sqrt() / self.spoiled(from.dot(self.direction), row).sqrt();
+        let fainter = ratio.sqrt() / self.spoiled(x, row).sqrt();
         share * (-0.5 * up * up * falling).exp() / fainter
     }
 
