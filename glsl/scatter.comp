@@ -157,16 +157,13 @@ uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
         float wanted = wanted_level(s.tissue, shape.w, drowned);
         float power = level_power(wanted, number);
         float x_plane = x_middle + ahead;
-        float within = clamp(x_plane, 0.0, s.extent);
-        float width = half_width(s, shape, within);
+        float width = half_width(s, shape, x_plane);
         if (!(power > 0.0) || !(width > 0.0)) continue;
 
         // Over the plane the beam's shape and the gain vary as a parabola through samples on both sides.
         uint below = row - min(row, span), above = min(row + span, frame.samples - 1u);
         float run = per_mm / max(float(above - below), 1.0);
-        float ratio = strip_ratio(s, within);
-        vec3 scale = vec3(ratio, 1.0, 1.0);
-        vec3 here = scale * shape.xyz, shape_below = scale * rows[below].shape.xyz, shape_above = scale * rows[above].shape.xyz;
+        vec3 here = shape.xyz, shape_below = rows[below].shape.xyz, shape_above = rows[above].shape.xyz;
         vec3 slope = (shape_above - shape_below) * run;
         vec3 bend = (shape_above + shape_below - 2.0 * here) * mix(0.0, 2.0 * run * run, above - below == 2u * span);
         // The values of a row belong to the middle of its sample.
@@ -174,8 +171,8 @@ uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
 
         vec2 profile = strip_profile(rows[row].strip_core);
         float reach = 1.05 * width + beside;
-        float strength = lattice.amplitude * sqrt(power / ratio) * s.weight * thinning(s, x_plane, row) * frame.volume_scale;
-        strength *= scattered(s, within, row);
+        float strength = lattice.amplitude * sqrt(power) * s.weight * thinning(s, x_plane, row) * frame.volume_scale;
+        strength *= scattered(s, clamp(x_plane, 0.0, s.extent), row);
         if (depth > 0.0) {
             strength *= 1.0 + depth * tissue_texture((s.o + x_plane * s.d) / tissues[s.tissue].texture_length, tissues[s.tissue].seed);
         }
@@ -201,7 +198,8 @@ uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
             count.x += uint(counts);
             float off_row = dx - row_ahead;
             vec3 change = off_row * (slope + off_row * bend);
-            float off = abs(dot(rel, s.e_l)) / max(here.x + change.x, LEAST_PITCH);
+            float ratio = strip_ratio(s, along);
+            float off = abs(dot(rel, s.e_l)) / (max(here.x + change.x, LEAST_PITCH) * ratio);
             float share = min((1.0 - off) * profile.x, 1.0);
             // One branch, as many threads of a group have none of it.
             if (!(counts && present(lattice, bits) && along >= 0.0 && along < s.extent && share > 0.0)) continue;
@@ -210,7 +208,7 @@ uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
             float off_gain = off_row + 0.5 * mm_per_sample;
             change.z = off_gain * (slope.z + off_gain * bend.z);
             float exponent = constant + change.z - falling * dx - (here.y + change.y) * up * up - profile.y * off * off;
-            vec2 v = strength * share * exp2(exponent) * phasor(-(turns_middle + dx * turns_per_mm));
+            vec2 v = strength * share * inversesqrt(ratio) * exp2(exponent) * phasor(-(turns_middle + dx * turns_per_mm));
             v *= mix(-1.0, 1.0, (bits.z & 1u) == 0u);
             count.y += 1u;
             count.z += deposit_near(kappa_middle + dx * per_mm, v);

@@ -111,7 +111,6 @@ impl Tube<'_> {
             let width = 1.2 * self.half_width(self.sample(x, out)) + h;
             let strength =
                 self.weight(x, row) * power.sqrt() * factor(self.tissue, o + x * self.direction);
-            let ratio = self.ratio(on);
             let row_middle = o[b] - drift * da;
             let farthest = (width + walk.slant.abs() * reach) / walk.across.y.abs() + h;
             for j in cells([row_middle - farthest, row_middle + farthest], h) {
@@ -128,7 +127,7 @@ impl Tube<'_> {
                     let x = from.dot(self.direction);
                     if (0.0..self.segment.length).contains(&x) {
                         let strip = self.between_rows(x, out);
-                        let heard = self.heard(from, on, row, ratio, strip);
+                        let heard = self.heard(from, on, row, self.ratio(x), strip);
                         if heard > 0.0 {
                             let gain = Some(self.gain(x, out));
                             self.echo(from, strength * s.amplitude, heard, gain, out);
