@@ -65,7 +65,8 @@ fn pictures_say_what_they_show_and_how_large_it_is() {
         assert_eq!(settings["imaging"]["gain"], 7.0);
         assert_eq!(settings["simulation"]["sampling"], "main-path");
         assert_eq!(said["set"]["probe.depth"], "80 mm");
-        assert_eq!(said["scene_file"], "scenes/phantom.toml");
+        // The picture lies elsewhere: folders on the way would tell whose machine made it.
+        assert_eq!(said["scene_file"], "phantom.toml");
         assert_eq!(said["frames"][0]["file"], "a.png");
         assert_eq!(said["frames"][0]["pose"]["depth"], serde_json::json!([0.0, 0.0, 1.0]));
         assert_eq!(said["frames"][0]["time_s"], 0.0);
@@ -155,6 +156,66 @@ fn what_cannot_be_written_or_read_is_said_before_anything_is_simulated() {
         assert!(said.contains("help: "), "{args:?}: {said}");
     }
     assert_eq!(std::fs::read_dir(dir.path()).expect("there").count(), 1, "no draft is left");
+}
+
+/// What a command reads or writes, it does not write over, by whatever name.
+#[test]
+fn no_file_is_written_over_another_of_the_same_command() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| path(&dir.path().join(name)).to_owned();
+    let source = std::fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/limbs.toml"));
+    let source = source.expect("it ships");
+    for name in ["scene.toml", "bare", "poses.csv"] {
+        std::fs::write(at(name), &source).expect("written");
+    }
+    let (scene, bare, poses) = (at("scene.toml"), at("bare"), at("poses.csv"));
+    let step = at("./folder/../scene.toml");
+    std::fs::create_dir(at("folder")).expect("room");
+    let (picture, link) = (at("a.png"), at("link.png"));
+    #[cfg(unix)]
+    std::os::unix::fs::symlink(&bare, &link).expect("a link");
+    #[cfg(not(unix))]
+    std::fs::hard_link(&bare, &link).expect("a link");
+    let volume = at("v.mha");
+    for (args, told) in [
+        (vec!["render", &scene, "-o", &picture, "--json", &scene], "is read as the scene"),
+        (vec!["render", &scene, "-o", &picture, "--json", &step], "is read as the scene"),
+        (vec!["render", &bare, "-o", &bare], "is read as the scene"),
+        #[cfg(unix)]
+        (vec!["render", &bare, "-o", &link], "is read as the scene"),
+        (vec!["render", &scene, "-o", &picture, "--json", &picture], "would be written as -o"),
+        (vec!["render", &scene, "-o", &picture, "--labels", &picture], "would be written as -o"),
+        (
+            vec!["render", &scene, "--trajectory", &poses, "-o", &picture, "--json", &poses],
+            "is read as --trajectory",
+        ),
+        (
+            vec!["acquire", &scene, "--sweep", "linear:1", "-o", &volume, "--volume", &volume],
+            "would be written as -o",
+        ),
+        (vec!["reconstruct", &volume, "-o", &volume], "is read as the tracked frames"),
+        (vec!["view", &scene, "--json", &scene], "is read as the scene"),
+        (
+            vec!["study", "answers", &poses, "--key", &scene, "--ratings", &scene],
+            "is read as --key",
+        ),
+    ] {
+        let out = insonify(&args);
+        let said = text(&out.stderr);
+        assert!(!out.status.success() && said.contains(told), "{args:?}: {said}");
+        assert!(said.contains("help: name another file by "), "{args:?}: {said}");
+    }
+    for name in [&scene, &bare, &poses] {
+        assert!(std::fs::read(name).expect("there") == source, "{name} is as it was");
+    }
+    // Figures say all that a sidecar does, so they may take its place.
+    let figures = at("a.json");
+    let args = ["-o", &picture, "--json", &figures, "--tracer", "bvh"];
+    let out = render("scenes/phantom.toml", &args);
+    assert!(out.status.success(), "{}", text(&out.stderr));
+    let figures = json(Path::new(&figures));
+    assert!(figures["stages_ms"].is_object() && figures["image"].is_object());
+    assert_eq!(figures["frames"][0]["file"], "a.png");
 }
 
 /// The program in an empty folder, with a home of its own and no display.

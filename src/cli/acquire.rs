@@ -143,6 +143,10 @@ fn writable(args: &Acquire) -> Result<()> {
             path.display()
         ));
     }
+    common::distinct(
+        &[("the scene", Some(&args.scene))],
+        &[("-o", args.output.as_deref()), ("--volume", args.volume.as_deref())],
+    )?;
     args.output.iter().chain(&args.volume).try_for_each(|path| common::writable(path))
 }
 

@@ -223,6 +223,44 @@ pub fn writable_folder(path: &Path) -> Result<()> {
     writable(&path.join("-"))
 }
 
+/// A file of a command, where it is given, with what it is to the user: "the scene", "--json".
+pub type Named<'a> = (&'a str, Option<&'a Path>);
+
+/// Refuses to write a file that the same command reads, or writes as something else: by whatever names, also through
+/// links. Pipes and devices take anything.
+///
+/// # Errors
+/// Two of them are one file.
+pub fn distinct(read: &[Named], written: &[Named]) -> Result<()> {
+    let mut taken: Vec<(&str, &str, PathBuf)> = Vec::new();
+    let read = read.iter().map(|&(name, path)| ("is read", name, path));
+    let written = written.iter().map(|&(name, path)| ("would be written", name, path));
+    for (deed, name, path) in read.chain(written) {
+        let Some(path) = path.filter(|path| !files::is_stream(path)) else { continue };
+        let file = itself(path);
+        let other = taken.iter().find(|(_, _, other)| *other == file);
+        if let Some((before, other, _)) = other.filter(|_| deed != "is read") {
+            return Err(miette!(
+                help = format!("name another file by {name}"),
+                "{} would be written as {name}, and {before} as {other}: one file cannot be both",
+                path.display()
+            ));
+        }
+        taken.push((deed, name, file));
+    }
+    Ok(())
+}
+
+/// The path of a file without links and steps back, also where there is no such file yet.
+fn itself(path: &Path) -> PathBuf {
+    let there = || {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+        let folder = folder.unwrap_or(Path::new(".")).canonicalize().ok()?;
+        Some(folder.join(path.file_name()?))
+    };
+    path.canonicalize().ok().or_else(there).unwrap_or_else(|| path.to_owned())
+}
+
 /// Uploads a scene, and reports on standard error which parts of it the device had to change.
 ///
 /// # Errors

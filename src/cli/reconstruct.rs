@@ -11,7 +11,7 @@ use insonify::volume::{
 };
 use miette::{Context, Result};
 
-use super::common::{notes, writable};
+use super::common::{distinct, notes, writable};
 
 /// Arguments of `insonify reconstruct`. What is given here goes before the configuration.
 #[derive(Debug, Args)]
@@ -101,6 +101,10 @@ fn clip(text: &str) -> Result<[i32; 4], String> {
 /// # Errors
 /// Every fault of files and settings, reported once.
 pub fn run(args: &Reconstruct) -> Result<()> {
+    distinct(
+        &[("the tracked frames", Some(&args.sequence)), ("--config", args.config.as_deref())],
+        &[("-o", Some(&args.output))],
+    )?;
     writable(&args.output)?;
     let (mut sequence, warnings) = Sequence::load(&args.sequence)?;
     notes(&warnings);

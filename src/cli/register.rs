@@ -12,7 +12,7 @@ use insonify::scene::{Acquired, Scene};
 use insonify::volume::Frame;
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
 
-use super::common::{notes, seconds, writable};
+use super::common::{self, notes, seconds, writable};
 
 mod inputs;
 mod told;
@@ -109,6 +109,7 @@ struct Registered {
 /// # Errors
 /// Every mistake of the user, reported once; the scene file is then untouched.
 pub fn run(args: &Register) -> Result<()> {
+    distinct(args)?;
     args.output.iter().chain(&args.json).try_for_each(|path| writable(path))?;
     let (mut scene, found) = Scene::load(&args.scene, &[])?;
     notes(&found);
@@ -230,6 +231,20 @@ impl Target {
             }
         }
     }
+}
+
+/// Refuses files of which one would replace another; -o may be the scene itself, which keeps all but what is set.
+fn distinct(args: &Register) -> Result<()> {
+    let read = [
+        ("--points", &args.points),
+        ("--volume-surface", &args.volume_surface),
+        ("--landmarks", &args.landmarks),
+        ("--model-landmarks", &args.model_landmarks),
+        ("--volume-landmarks", &args.volume_landmarks),
+    ];
+    let read = read.map(|(name, path)| (name, path.as_deref()));
+    common::distinct(&read, &[("-o", args.output.as_deref()), ("--json", args.json.as_deref())])?;
+    common::distinct(&[("the scene", Some(&args.scene))], &[("--json", args.json.as_deref())])
 }
 
 fn write(args: &Register, entries: &[Entry], target: &Target, made: &Registered) -> Result<()> {

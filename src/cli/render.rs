@@ -9,7 +9,7 @@ use serde_json::{Map, Value, json};
 use super::common::{self, Common, Progress};
 use insonify::gpu::{Device, FrameTimings, peak_bytes};
 use insonify::output;
-use insonify::scene::{Scene, file};
+use insonify::scene::{Scene, file, shipped};
 use insonify::settings::{Group as _, ScatterMode, Simulation};
 use insonify::sim::calibration::Calibration;
 use insonify::sim::dump;
@@ -96,6 +96,7 @@ fn rate(text: &str) -> Result<f64, String> {
 /// Every mistake of the user and every error of the device, reported once.
 pub fn run(args: &Render) -> Result<()> {
     let output = args.output.clone().unwrap_or_else(|| default_output(&args.scene));
+    distinct(args, &output)?;
     if let Some(dir) = &args.dump {
         common::writable_folder(dir)?;
     }
@@ -120,7 +121,7 @@ pub fn run(args: &Render) -> Result<()> {
     let mut simulator = common::simulator(&device, &library, &scene, tracer)?;
     let build_ms = loaded.elapsed().as_secs_f64() * 1e3;
 
-    let said = said(args, &scene, &of_file, &device, tracer)?;
+    let said = said(args, &output, &scene, &of_file, &device, tracer)?;
     let (timings, said) =
         simulate(&mut simulator, &mut library, &mut scene, args, &output, moments, said)?;
     if let Some(dir) = &args.dump {
@@ -170,10 +171,23 @@ pub fn run(args: &Render) -> Result<()> {
     args.common.validated(&device)
 }
 
+/// Refuses files of which one would replace another. Figures may be written into the sidecar: they say all that it does.
+fn distinct(args: &Render, output: &Path) -> Result<()> {
+    common::distinct(
+        &[("the scene", Some(&args.scene)), ("--trajectory", args.trajectory.as_deref())],
+        &[
+            ("-o", Some(output)),
+            ("--json", args.json.as_deref()),
+            ("--labels", args.labels.as_deref()),
+        ],
+    )
+}
+
 /// What is said of all frames beside the pictures and in them. Under `set` stands what of the scene file to replace to
 /// get them again.
 fn said(
     args: &Render,
+    output: &Path,
     scene: &Scene,
     of_file: &Simulation,
     device: &Device,
@@ -186,7 +200,7 @@ fn said(
     let said = json!({
         "program": concat!("insonify ", env!("CARGO_PKG_VERSION")),
         "scene": scene.name,
-        "scene_file": args.scene.display().to_string(),
+        "scene_file": shipped::cited(&args.scene, output.parent().unwrap_or(output)),
         "device": { "name": device.name(), "driver": device.driver(), "api": device.api_version() },
         "tracer": tracer.to_string(),
         "time_s": args.common.time,

@@ -64,6 +64,10 @@ fn scale(text: &str) -> Result<f32, String> {
 /// # Errors
 /// Everything that the user or the device can get wrong, said once.
 pub fn run(args: &View) -> Result<()> {
+    common::distinct(
+        &[("the scene", Some(&args.scene)), ("--trajectory", args.trajectory.as_deref())],
+        &[("--screenshot", args.screenshot.as_deref()), ("--json", args.json.as_deref())],
+    )?;
     args.screenshot.iter().chain(&args.json).try_for_each(|path| common::writable(path))?;
     let trajectory = trajectory(args)?;
     let common = args.common.clone();

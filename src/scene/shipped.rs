@@ -2,7 +2,7 @@
 //! is asked for: so they are found wherever the program stands, and read as all scenes are.
 
 use std::io::{Error, Read as _, Result};
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use flate2::read::GzDecoder;
 
@@ -63,6 +63,35 @@ pub fn is_shipped(path: &Path) -> bool {
     own.is_some_and(|own| path.is_ok_and(|path| path.starts_with(own)))
 }
 
+/// The way from `folder` to a scene's file, for what is written there and handed on: the name of a scene that ships; the
+/// file's name alone where the way would lead through folders that name a person or a machine.
+pub fn cited(scene: &Path, folder: &Path) -> String {
+    let file = scene.file_name().unwrap_or(scene.as_os_str()).to_string_lossy().into_owned();
+    if is_shipped(scene) {
+        return file.trim_end_matches(".toml").to_owned();
+    }
+    // The parent of a bare name is empty, which means the folder of work.
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    let [scene, folder] = [scene, folder].map(std::path::absolute);
+    let way = scene.ok().zip(folder.ok());
+    way.and_then(|(scene, folder)| way_to(&scene, &folder, dirs::home_dir())).unwrap_or(file)
+}
+
+/// The way from a folder to a file, both absolute, with `/` between its parts; none where they have nothing but the root in
+/// common, or where it leads from elsewhere into a user's home folder.
+fn way_to(file: &Path, folder: &Path, home: Option<PathBuf>) -> Option<String> {
+    let [to, from]: [Vec<_>; 2] = [file, folder].map(|path| path.components().collect());
+    let common = to.iter().zip(&from).take_while(|(a, b)| a == b).count();
+    let shared: PathBuf = to[..common].iter().collect();
+    let enters = home.is_some_and(|home| file.starts_with(&home) && !shared.starts_with(&home));
+    if !to[..common].iter().any(|part| matches!(part, Component::Normal(_))) || enters {
+        return None;
+    }
+    let up = from[common..].iter().map(|_| "..".into());
+    let down = to[common..].iter().map(|part| part.as_os_str().to_string_lossy());
+    Some(up.chain(down).collect::<Vec<_>>().join("/"))
+}
+
 /// Not in a cache: scenes saved elsewhere go on naming the meshes in it. Each content has a folder of its own.
 fn folder() -> Option<PathBuf> {
     dirs::data_local_dir().map(|data| data.join("insonify").join(format!("scenes-{STAMP:08x}")))
@@ -117,6 +146,26 @@ mod tests {
             assert_eq!(named(Path::new(path)), None, "{path}");
         }
         assert!(names().starts_with("abdomen, artery"), "{}", names());
+    }
+
+    #[test]
+    fn what_is_handed_on_does_not_say_whose_machine_it_was_made_on() {
+        let home = || Some(PathBuf::from("/home/anna"));
+        let way = |file: &str, folder: &str| way_to(Path::new(file), Path::new(folder), home());
+        for (file, folder, expected) in [
+            ("/home/anna/us/a.toml", "/home/anna/us", Some("a.toml")),
+            ("/home/anna/us/a.toml", "/home/anna/out/1", Some("../../us/a.toml")),
+            ("/data/scenes/a.toml", "/data/out", Some("../scenes/a.toml")),
+            ("/home/anna/us/a.toml", "/home/shared", None),
+            ("/home/anna/us/a.toml", "/tmp", None),
+            ("/data/scenes/a.toml", "/tmp", None),
+        ] {
+            assert_eq!(way(file, folder).as_deref(), expected, "{file} from {folder}");
+        }
+        let heart = unpacked("heart").expect("a folder of data");
+        assert_eq!(cited(&heart, Path::new("/tmp")), "heart");
+        let elsewhere = tempfile::tempdir().expect("a folder").path().join("liver.toml");
+        assert_eq!(cited(&elsewhere, Path::new("/nowhere/else")), "liver.toml");
     }
 
     #[test]

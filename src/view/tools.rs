@@ -19,6 +19,7 @@ use super::saved::Notices;
 use crate::exam::Report;
 use crate::gpu::{DeviceInfo, Image, Screenshot};
 use crate::output::dicom::Study;
+use crate::scene::shipped;
 use crate::sim::facts::{self, Area};
 
 /// Most frames of the loop.
@@ -259,7 +260,7 @@ impl Tools {
             "program": concat!("insonify ", env!("CARGO_PKG_VERSION")),
             "saved": Local::now().to_rfc3339_opts(SecondsFormat::Secs, false),
             "scene": model.title,
-            "scene_file": model.file.path.display().to_string(),
+            "scene_file": shipped::cited(&model.file.path, &self.folder),
             "device": self.device,
             "image": facts::image(&area),
             "time_s": frame.seconds,

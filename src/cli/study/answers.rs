@@ -9,7 +9,7 @@ use insonify::study::key::Key;
 use insonify::study::results::{Results, csv, markdown, plain, ratings};
 use miette::{Context, IntoDiagnostic, Result, miette};
 
-use super::super::common::writable;
+use super::super::common::{distinct, writable};
 
 /// Arguments of `insonify study answers`.
 #[derive(Debug, Args)]
@@ -41,6 +41,9 @@ pub fn run(args: &Answers) -> Result<()> {
             ));
         }
     };
+    let answers = args.answers.iter().map(|path| ("answers", Some(path.as_path())));
+    let read: Vec<_> = answers.chain([("--key", Some(args.key.as_path()))]).collect();
+    distinct(&read, &[("-o", args.output.as_deref()), ("--ratings", args.ratings.as_deref())])?;
     args.output.iter().chain(&args.ratings).try_for_each(|path| writable(path))?;
     let key = Key::read(&args.key)?;
     let answers = read_all(&args.answers, &key)?;
