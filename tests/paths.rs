@@ -158,7 +158,7 @@ fn what_cannot_be_written_or_read_is_said_before_anything_is_simulated() {
     assert_eq!(std::fs::read_dir(dir.path()).expect("there").count(), 1, "no draft is left");
 }
 
-/// What a command reads or writes, it does not write over, by whatever name.
+/// Files that a command reads or writes are not written over by it, by whatever name.
 #[test]
 fn no_file_is_written_over_another_of_the_same_command() {
     let dir = tempfile::tempdir().expect("a folder");

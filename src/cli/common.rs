@@ -232,21 +232,21 @@ pub type Named<'a> = (&'a str, Option<&'a Path>);
 /// # Errors
 /// Two of them are one file.
 pub fn distinct(read: &[Named], written: &[Named]) -> Result<()> {
-    let mut taken: Vec<(&str, &str, PathBuf)> = Vec::new();
-    let read = read.iter().map(|&(name, path)| ("is read", name, path));
-    let written = written.iter().map(|&(name, path)| ("would be written", name, path));
-    for (deed, name, path) in read.chain(written) {
+    let mut taken: Vec<(bool, &str, PathBuf)> = Vec::new();
+    let read = read.iter().map(|named| (false, named));
+    for (is_written, &(name, path)) in read.chain(written.iter().map(|named| (true, named))) {
         let Some(path) = path.filter(|path| !files::is_stream(path)) else { continue };
         let file = itself(path);
         let other = taken.iter().find(|(_, _, other)| *other == file);
-        if let Some((before, other, _)) = other.filter(|_| deed != "is read") {
+        if let Some((other_is_written, other, _)) = other.filter(|_| is_written) {
+            let deed = if *other_is_written { "would be written" } else { "is read" };
             return Err(miette!(
                 help = format!("name another file by {name}"),
-                "{} would be written as {name}, and {before} as {other}: one file cannot be both",
+                "{} would be written as {name}, and {deed} as {other}: one file cannot be both",
                 path.display()
             ));
         }
-        taken.push((deed, name, file));
+        taken.push((is_written, name, file));
     }
     Ok(())
 }
@@ -254,9 +254,8 @@ pub fn distinct(read: &[Named], written: &[Named]) -> Result<()> {
 /// The path of a file without links and steps back, also where there is no such file yet.
 fn itself(path: &Path) -> PathBuf {
     let there = || {
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-        let folder = folder.unwrap_or(Path::new(".")).canonicalize().ok()?;
-        Some(folder.join(path.file_name()?))
+        let path = std::path::absolute(path).ok()?;
+        Some(path.parent()?.canonicalize().ok()?.join(path.file_name()?))
     };
     path.canonicalize().ok().or_else(there).unwrap_or_else(|| path.to_owned())
 }
