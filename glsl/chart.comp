@@ -39,7 +39,7 @@ void main() {
     vec4 place_loss = vec4(0.0), moved_incidence = vec4(0.0, 0.0, 0.0, -1.0);
     vec3 rest = vec3(0.0);
     vec2 at;
-    if (sector(i, j, at)) {
+    if (sector(raster(), i, j, at)) {
         vec2 ends = vec2(float(frame.scanlines - 1u), float(frame.samples - 1u));
         vec2 p = clamp(at, vec2(0.0), ends);
         vec2 low = floor(p), high = min(low + 1.0, ends);

@@ -1,7 +1,7 @@
 // variants: bvh query(RAY_QUERY)
 #version 460
-// Straight along each scanline through the masking geometry: the mask (1 outside) at each sample, and
-// the grey level of the acquired volume there. One work group is one scanline in the middle of the slice.
+// Straight along each scanline through the masking geometry: the mask (1 outside) at each sample and the grey level of
+// the acquired volume there, and what blocks of samples have. One work group is one scanline in the middle of the slice.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_samplerless_texture_functions : require
 #ifdef RAY_QUERY
@@ -27,6 +27,7 @@ layout(std430, binding = 8) buffer CounterBuffer { Counters counters; };
 layout(std430, binding = 9) buffer PrescanBuffer { float prescan[]; };
 layout(std430, binding = 10) readonly buffer ScanlineBuffer { Scanline scanlines[]; };
 layout(std430, binding = 11) readonly buffer TissueBuffer { Tissue tissues[]; };
+layout(std430, binding = 12) buffer BlockBuffer { uint mask_blocks[]; };
 
 #define RAY_SKIPS(i) (instances[i].masks == 0u)
 #define RAY_SELECTS true
@@ -83,6 +84,22 @@ float acquired_level(vec3 voxel) {
     return clamp(mix(near, far, f.z) * fusion.slope + fusion.intercept, 0.0, 1.0);
 }
 
+// What the samples of a block have: TILE_ACQUIRED, TILE_SIMULATED.
+uint block_has(uint block) {
+    uint end = min((block + 1u) * MASK_BLOCK, frame.samples) - 1u;
+    float first = float(block * MASK_BLOCK) * frame.sample_pitch;
+    float last = float(end) * frame.sample_pitch;
+    int around = enclosing;
+    uint has = 0u;
+    for (uint i = 0u; i <= crossing_count; ++i) {
+        bool behind = i == crossing_count || depths[i] > first;
+        if (behind) has |= around > 0 ? TILE_SIMULATED : TILE_ACQUIRED;
+        if (i == crossing_count || depths[i] > last) break;
+        around += crossings[i] > 0.0 ? 1 : -1;
+    }
+    return has;
+}
+
 void main() {
     uint line = gl_WorkGroupID.x;
     vec3 o, d, lateral;
@@ -108,5 +125,9 @@ void main() {
         uint at = 2u * (line * frame.samples + k);
         prescan[at] = around > 0 ? 0.0 : 1.0;
         prescan[at + 1u] = acquired_level(start + t * along);
+    }
+    uint blocks = (frame.samples + MASK_BLOCK - 1u) / MASK_BLOCK;
+    for (uint block = gl_LocalInvocationID.x; block < blocks; block += 64u) {
+        mask_blocks[line * blocks + block] = block_has(block);
     }
 }

@@ -18,6 +18,8 @@ const float FAR_PIECE = 1e30;       // begin of the piece that ends the list, be
 const int BEAM_LINES = 8;           // neighbouring scanlines of one sample
 const int AXIAL_SAMPLES = 8;        // neighbouring samples of one scanline
 const int BLUR_SUMS = 16;           // neighbouring sums of one column
+const uint TILE = 32u;              // pixels along the edges of a tile of the image; a multiple of BLUR_SUMS
+const uint MASK_BLOCK = 64u;        // neighbouring samples of one scanline whose mask is summed up
 // Most neighbours on each side over which is smoothed.
 const int LATERAL_REACH = 16;       // scanlines
 const int AXIAL_REACH = 32;         // samples
@@ -72,6 +74,11 @@ const uint REFLECTED = 0x80000000u; // bit of a segment's line: it was reflected
 const uint BLEND_LINEAR = 0u;
 const uint BLEND_SMOOTH = 1u;
 const uint BLEND_MULTIBAND = 2u;
+// What a block of samples has, or a tile's pixels and those of the boxes around them.
+const uint TILE_ACQUIRED = 1u;      // places outside all masks
+const uint TILE_SIMULATED = 2u;     // places inside
+const uint TILE_BLURRED = 4u;       // boxes around pixels of mixed tiles reach this one: its mask is converted and blurred
+const uint TILE_WHOLE = 8u;         // every intermediate image is wanted here
 const uint MASK_SPEED_PROBE = 0u;      // speed of samples through masks
 const uint MASK_SPEED_ENCLOSING = 1u;
 

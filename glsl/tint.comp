@@ -8,11 +8,15 @@ layout(std430, binding = 0) readonly buffer FrameBuffer { Frame frame; };
 layout(std430, binding = 1) readonly buffer FusionBuffer { Fusion fusion; };
 layout(std430, binding = 2) readonly buffer FusedBuffer { uint fused[]; };
 layout(std430, binding = 3) readonly buffer MaskBuffer { float mask[]; };
-layout(std430, binding = 4) readonly buffer SumBuffer { float sums[]; };
-layout(std430, binding = 5) buffer TintedBuffer { uint tinted[]; };
+layout(std430, binding = 4) readonly buffer SumBuffer { vec2 sums[]; };
+layout(std430, binding = 5) readonly buffer TileBuffer { uint tiles[]; };
+layout(std430, binding = 6) buffer TintedBuffer { uint tinted[]; };
 
 // Opacity of the colour over a pixel that is all acquired; the colour, red in the lowest byte.
 layout(push_constant) uniform Push { float opacity; uint colour; };
+
+#include "tiles.glsl"
+#include "share.glsl"
 
 void main() {
     uint i = gl_GlobalInvocationID.x;
@@ -21,14 +25,9 @@ void main() {
     uint at = j * frame.image_width + i;
     uint pixel = fused[at];
     if ((pixel >> 24u) != 0u) {
-        float m;
-        if (fusion.blend == BLEND_MULTIBAND) {
-            // Each band has its own width of border; the mask is the middle of all.
-            m = clamp(mask[2u * at], 0.0, 1.0);
-        } else {
-            m = sums[2u * at] >= sums[2u * at + 1u] ? 1.0 : sums[2u * at] / sums[2u * at + 1u];
-            if (fusion.blend == BLEND_SMOOTH) { m = m * m * (3.0 - 2.0 * m); }
-        }
+        // Blended by bands, each has its own width of border; the mask is the middle of all.
+        float m = fusion.blend == BLEND_MULTIBAND ? clamp(mask[2u * at], 0.0, 1.0)
+            : acquired_share(tiles[tile_of(i, j)], at);
         float share = opacity * m;
         uint mixed = 0xff000000u;
         for (uint shift = 0u; shift < 24u; shift += 8u) {

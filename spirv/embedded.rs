@@ -33,6 +33,7 @@
     ("scatter_rigid", include_bytes!("scatter_rigid.spv")),
     ("shadow_bvh", include_bytes!("shadow_bvh.spv")),
     ("shadow_query", include_bytes!("shadow_query.spv")),
+    ("tiles", include_bytes!("tiles.spv")),
     ("tint", include_bytes!("tint.spv")),
     ("trace_bvh", include_bytes!("trace_bvh.spv")),
     ("trace_count", include_bytes!("trace_count.spv")),

@@ -266,7 +266,10 @@ impl Simulator {
         passes.run(&mut cmd, &AXIAL)?;
         // From here on the frame is not abandoned, so that the picture is replaced as a whole.
         cmd.keep_on();
-        passes.run(&mut cmd, &DISPLAY)?;
+        let fusion = scene.fusion.as_ref().filter(|_| line.is_none() && scene.shows_volume());
+        if fusion.is_none() {
+            passes.run(&mut cmd, &DISPLAY)?;
+        }
         (self.labelled, self.levelled, self.chosen) = (labelled, levelled, 0);
         if labelled {
             passes.run(&mut cmd, &LABEL)?;
@@ -276,7 +279,10 @@ impl Simulator {
             }
             passes.run(&mut cmd, &CHART)?;
         }
-        self.fused = line.is_none() && scene.shows_volume() && passes.fuse(&mut cmd, scene)?;
+        if let Some(fusion) = fusion {
+            passes.fuse(&mut cmd, fusion)?;
+        }
+        self.fused = fusion.is_some();
         if let Some(image) = &self.shown_on {
             cmd.copy_to_image(passes.lanes[0].pixels(self.fused), image)?;
         }

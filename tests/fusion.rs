@@ -366,6 +366,63 @@ fn render_warns_of_a_mask_off_the_image_and_shows_the_steps() {
     assert_eq!(fused[1], level("6_background.png", 10, 190));
 }
 
+/// Pixels of a fused image that are not the mix of its whole steps; a rounding either side of the middle between two
+/// greys will do.
+fn unlike_the_steps(simulator: &mut Simulator, is_smooth: bool) -> (usize, [usize; 3]) {
+    let (_, _, shown) = simulator.pixels().expect("pixels");
+    let steps = simulator.fusion_steps().expect("read").expect("fused");
+    let (mut wrong, mut kinds) = (0, [0; 3]);
+    for (i, pixel) in shown.chunks_exact(4).enumerate() {
+        let simulated = steps.simulated[4 * i..][..4].to_vec();
+        if simulated[3] == 0 {
+            wrong += usize::from(pixel != [0; 4]);
+            continue;
+        }
+        let m = f64::from(steps.blurred[i]).min(1.0);
+        kinds[if m == 0.0 { 0 } else { 1 + usize::from(m == 1.0) }] += 1;
+        let m = if is_smooth { m * m * (3.0 - 2.0 * m) } else { m };
+        let level =
+            255.0 * m * f64::from(steps.background[i]) + (1.0 - m) * f64::from(simulated[0]);
+        wrong += usize::from((level - f64::from(pixel[0])).abs() > 0.501 || pixel[3] != 255);
+    }
+    (wrong, kinds)
+}
+
+/// Frames convert and blur only what they show. The result is that of the whole images, whatever the probe and wherever
+/// the mask's border lies in the image; what was shown before does not come back.
+#[test]
+fn a_fused_frame_is_the_mix_of_its_whole_steps() {
+    let device = test_device();
+    let library = Library::embedded();
+    for preset in ["linear", "abdominal", "phased"] {
+        for (blend, boxes) in [("linear", [1, 9, 32]), ("smooth", [2, 33, 150])] {
+            let folder = tempfile::tempdir().expect("a folder");
+            write(folder.path(), FUSED);
+            let set = [("probe.preset", preset), ("fusion.blend", blend)];
+            let set = set.map(|(key, value)| (key.to_owned(), value.to_owned()));
+            let (scene, _) = Scene::load(&folder.path().join("scene.toml"), &set).expect("sound");
+            let mut simulator =
+                Simulator::new(&device, &library, &scene, Tracer::Bvh).expect("made");
+            for (index, edge) in (0u32..).zip(boxes) {
+                let mut scene = scene.clone();
+                scene.fusion.as_mut().expect("fused").blur = edge;
+                // Another place each time: tiles of the frame before have become others.
+                scene.world_from_probe *=
+                    DAffine3::from_translation(DVec3::new(3.7 * f64::from(index), 0.0, 0.0));
+                simulator.frame(&scene, index).expect("a frame");
+                let (wrong, kinds) = unlike_the_steps(&mut simulator, blend == "smooth");
+                assert_eq!(wrong, 0, "{preset}, {blend}, {edge}");
+                assert!(kinds[0] > 0 || edge > 100, "{preset}, {blend}, {edge}: {kinds:?}");
+                assert!(kinds[1] > 0 && kinds[2] > 500, "{preset}, {blend}, {edge}: {kinds:?}");
+                // The other curve is noticed where both images are mixed.
+                let (planted, _) = unlike_the_steps(&mut simulator, blend != "smooth");
+                assert!(planted > 100 || edge < 9, "{preset}, {blend}, {edge}: {planted}");
+            }
+        }
+    }
+    assert_eq!(device.validation_messages(), Vec::<String>::new());
+}
+
 #[test]
 fn kernels_of_the_fusion_run_alone_on_what_a_frame_dumped() {
     let device = test_device();
@@ -376,10 +433,10 @@ fn kernels_of_the_fusion_run_alone_on_what_a_frame_dumped() {
         Simulator::new(&device, &library, &plain, Tracer::Bvh).expect("a simulator");
     // Both may be switched on later.
     for (scene, names) in [
-        (plain, &["mask", "convert", "blur", "fuse"][..]),
+        (plain, &["mask", "tiles", "convert", "blur", "fuse"][..]),
         (
             load(&bands).expect("sound"),
-            &["mask", "shadow", "darken", "convert", "difference", "fuse"],
+            &["mask", "shadow", "darken", "tiles", "convert", "difference", "fuse"],
         ),
     ] {
         simulator.frame(&scene, 0).expect("a frame");

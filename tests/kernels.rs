@@ -93,6 +93,7 @@ subjects!(
     mask,
     shadow,
     darken,
+    tiles,
     convert,
     blur,
     difference,

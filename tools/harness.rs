@@ -35,6 +35,7 @@ mod run;
 mod scatter;
 mod shadow;
 mod sizes;
+mod tiles;
 mod trace;
 mod worlds;
 
@@ -297,7 +298,7 @@ impl Subject {
 }
 
 /// Every kernel of the image, in the order of a frame after the three that only tests use.
-pub const SUBJECTS: [Subject; 27] = [
+pub const SUBJECTS: [Subject; 28] = [
     angles::SUBJECT,
     geometry::SUBJECT,
     rays::SUBJECT,
@@ -319,6 +320,7 @@ pub const SUBJECTS: [Subject; 27] = [
     mask::SUBJECT,
     shadow::SUBJECT,
     darken::SUBJECT,
+    tiles::SUBJECT,
     convert::SUBJECT,
     blur::SUBJECT,
     difference::SUBJECT,

@@ -41,6 +41,7 @@ pub mod shadow;
 pub mod stack;
 pub mod straight;
 pub mod texture;
+pub mod tiles;
 pub mod trace;
 mod transmitted;
 mod wavefront;

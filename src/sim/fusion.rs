@@ -24,8 +24,10 @@ pub(super) struct FusionResources {
     /// The time of the volume that the frame shows.
     now: usize,
     pub(super) pyramid: Pyramid,
-    /// True if the last frame was blended by bands.
-    banded: bool,
+    /// Levels of the pyramid above the finest, if the frame is blended by bands.
+    pub(super) bands: Option<u32>,
+    /// True if the simulated anatomy shades the volume in the frame.
+    pub(super) shaded: bool,
 }
 
 impl FusionResources {
@@ -42,7 +44,13 @@ impl FusionResources {
             Some(before) => Arc::clone(&before.texture),
             None => Arc::new(VolumeTexture::new(device, acquired)?),
         };
-        Ok(Some(Self { texture, now: acquired.now, pyramid: Pyramid::default(), banded: false }))
+        Ok(Some(Self {
+            texture,
+            now: acquired.now,
+            pyramid: Pyramid::default(),
+            bands: None,
+            shaded: false,
+        }))
     }
 
     /// The volume at the time that the frame shows.
@@ -100,9 +108,10 @@ impl FusionResources {
         let constants = self.constants(acquired, fusion);
         cmd.write(&buffers["fusion"], 0, bytemuck::bytes_of(&constants))?;
         self.now = acquired.now;
-        self.banded = is_banded(scene);
-        if self.banded {
-            self.pyramid.fit(cmd.device(), buffers.room().pixels(), fusion.levels())?;
+        self.shaded = fusion.background_shadows;
+        self.bands = is_banded(scene).then(|| fusion.levels());
+        if let Some(levels) = self.bands {
+            self.pyramid.fit(cmd.device(), buffers.room().pixels(), levels)?;
         }
         Ok(())
     }

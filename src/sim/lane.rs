@@ -119,6 +119,12 @@ impl Lane {
         &self.fusion.as_ref().expect("an image with a volume").pyramid
     }
 
+    /// Mask and acquired volume along the scanlines, with shadows if the frame has them.
+    pub(super) fn prescan(&self) -> &Buffer {
+        let fusion = self.fusion.as_ref().expect("an image with a volume");
+        &self.buffers[if fusion.shaded { "shaded" } else { "prescan" }]
+    }
+
     /// The finished image.
     pub(super) fn pixels(&self, fused: bool) -> &Buffer {
         &self.buffers[pixels(fused)]

@@ -46,6 +46,18 @@ constants! {
     pub const AXIAL_SAMPLES: u32 = 8;
     /// Neighbouring sums of one column that one thread of `blur` computes.
     pub const BLUR_SUMS: u32 = 16;
+    /// Pixels along the edges of a tile of the image.
+    pub const TILE: u32 = 32;
+    /// Neighbouring samples of one scanline whose mask is summed up.
+    pub const MASK_BLOCK: u32 = 64;
+    /// Bit of a block of samples or of a tile: it has places outside all masks.
+    pub const TILE_ACQUIRED: u32 = 1;
+    /// Bit of a block of samples or of a tile: it has places inside a mask.
+    pub const TILE_SIMULATED: u32 = 2;
+    /// Bit of a tile: boxes around pixels of tiles that have both reach it.
+    pub const TILE_BLURRED: u32 = 4;
+    /// Bit of a tile: every intermediate image is wanted there.
+    pub const TILE_WHOLE: u32 = 8;
 
     /// Blend: the blurred mask is the weight of the acquired image.
     pub const BLEND_LINEAR: u32 = 0;

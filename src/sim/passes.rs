@@ -12,13 +12,13 @@ use super::line::OneLine;
 use super::pass::{Extent, Pass, Sizes, Variants};
 use super::shaders::Library;
 use super::stages::{
-    self, APERTURE, CONVERT, DARKEN, EXPECT, FUSE, MASK, ORIGIN, SCATTER, SHADOW, TRACE, aperture,
-    scatter,
+    self, APERTURE, CONVERT, DARKEN, DISPLAY, EXPECT, FUSE, MASK, ORIGIN, SCATTER, SHADOW, TRACE,
+    aperture, scatter,
 };
 use super::tables::Tables;
 use super::{SimError, World};
 use crate::gpu::{Binding, Buffer, Commands, Device, GpuError, Kernel, Stage};
-use crate::scene::Scene;
+use crate::scene::{Fusion, Scene};
 use crate::settings::Blend;
 
 /// For a lane, the buffers that a dispatch binds instead of those of the same names.
@@ -245,36 +245,57 @@ impl Passes {
         Ok(())
     }
 
-    /// Mixes the images with the acquired volume, if there is one.
-    pub(super) fn fuse(&self, cmd: &mut Commands, scene: &Scene) -> Result<bool, GpuError> {
-        let (true, Some(fusion)) = (scene.volume.is_some(), &scene.fusion) else {
-            return Ok(false);
-        };
-        // The output of `display` is read by kernels here, not only copied.
-        cmd.barrier(Stage::Compute, Stage::Compute);
+    /// Records the images mixed with the acquired volume.
+    pub(super) fn fuse(&self, cmd: &mut Commands, fusion: &Fusion) -> Result<(), GpuError> {
         self.run(cmd, &MASK)?;
-        let mut prescan = "prescan";
         if fusion.background_shadows {
             self.run(cmd, &SHADOW)?;
             if self.loses_by_aperture() {
                 self.converge(cmd, &|lane| vec![("apertures", &lane.buffers["shades"])])?;
             }
             self.run(cmd, &DARKEN)?;
-            prescan = "shaded";
         }
-        self.run_with(cmd, &CONVERT, &|lane| vec![("prescan", &lane.buffers[prescan])])?;
-        match fusion.blend {
+        self.mixed_by(cmd, fusion.blend)?;
+        self.run_with(cmd, &FUSE, &|lane| {
+            // Not read without blending by bands.
+            let change = match fusion.blend {
+                Blend::Multiband => lane.pyramid().change(),
+                Blend::Linear | Blend::Smooth => &lane.buffers["background"],
+            };
+            vec![("prescan", lane.prescan()), ("change", change)]
+        })
+    }
+
+    /// Records what says how the images are mixed.
+    fn mixed_by(&self, cmd: &mut Commands, blend: Blend) -> Result<(), GpuError> {
+        match blend {
             Blend::Multiband => {
-                self.bands(cmd, fusion.levels())?;
-                self.run_with(cmd, &FUSE, &|lane| vec![("change", lane.pyramid().change())])?;
+                self.convert(cmd, true)?;
+                self.bands(cmd)
             }
-            // Without blending by bands, the kernel binds any buffer as `change` and does not read it.
             Blend::Linear | Blend::Smooth => {
-                self.blur(cmd)?;
-                self.run_with(cmd, &FUSE, &|lane| vec![("change", &lane.buffers["background"])])?;
+                self.convert(cmd, false)?;
+                self.blur(cmd)
             }
         }
-        Ok(true)
+    }
+
+    /// Records the scan conversion of the mask where it is blurred; if `whole`, that of the mask, the acquired and the
+    /// simulated image everywhere.
+    fn convert(&self, cmd: &mut Commands, whole: bool) -> Result<(), GpuError> {
+        self.tiles(cmd, whole)?;
+        if whole {
+            self.run(cmd, &DISPLAY)?;
+            // Its output is read by kernels here, not only copied.
+            cmd.barrier(Stage::Compute, Stage::Compute);
+        }
+        self.run_with(cmd, &CONVERT, &|lane| vec![("prescan", lane.prescan())])
+    }
+
+    /// Records the intermediate images of the last fused frame, which that has made only where it needed them.
+    pub(super) fn fusion_steps(&self, cmd: &mut Commands) -> Result<(), GpuError> {
+        self.convert(cmd, true)?;
+        self.blur(cmd)
     }
 
     /// Records copies of results of a frame of these sizes that were read of the frame before.

@@ -19,6 +19,7 @@ pub use paint::PAINT;
 pub use pyramid::{COLLAPSE, DIFFERENCE, REDUCE};
 pub use scatter::SCATTER;
 pub use shadow::{DARKEN, SHADOW};
+pub use tiles::TILES;
 pub use tint::TINT;
 pub use trace::TRACE;
 
@@ -39,6 +40,7 @@ pub(super) mod paint;
 pub(super) mod pyramid;
 pub mod scatter;
 mod shadow;
+pub mod tiles;
 pub(super) mod tint;
 mod trace;
 
@@ -50,8 +52,19 @@ pub const IMAGE: [&Pass; 9] =
 pub const LABELS: [&Pass; 4] = [&EXPECT, &LABEL, &LEVEL, &CHART];
 
 /// Stages of frames that show an acquired volume, in order.
-pub const FUSION: [&Pass; 10] =
-    [&MASK, &SHADOW, &DARKEN, &CONVERT, &DIFFERENCE, &REDUCE, &COLLAPSE, &BLUR, &FUSE, &TINT];
+pub const FUSION: [&Pass; 11] = [
+    &MASK,
+    &SHADOW,
+    &DARKEN,
+    &TILES,
+    &CONVERT,
+    &DIFFERENCE,
+    &REDUCE,
+    &COLLAPSE,
+    &BLUR,
+    &FUSE,
+    &TINT,
+];
 
 /// All stages.
 pub fn all() -> impl Iterator<Item = &'static Pass> {

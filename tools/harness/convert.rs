@@ -2,9 +2,9 @@
 
 use super::display;
 use super::inputs::{Random, samples};
-use super::{Case, Check, Input, Job, Size, Subject};
+use super::{Case, Check, Input, Job, Size, Subject, UNWRITTEN, tiles};
 use crate::reference::convert;
-use insonify::sim::layout::Frame;
+use insonify::sim::layout::{Frame, TILE, TILE_BLURRED, TILE_WHOLE};
 use insonify::sim::stages;
 
 /// Largest difference of levels, as in `display`: white noise, positions exact to about 1e-6 of the image.
@@ -31,35 +31,57 @@ fn job(case: Case, size: Size) -> Job {
         prescan[700] = f32::NAN;
         prescan[901] = f32::INFINITY;
     }
-    let _pixels = display::pixels(&frame);
-    let given = vec![Input::words("frame", &[frame]), Input::floats("prescan", &prescan)];
+    let bits: &[u32] =
+        if case == Case::One { &[TILE_WHOLE] } else { &[0, TILE_BLURRED, TILE_WHOLE, TILE_WHOLE] };
+    let given = vec![
+        Input::words("frame", &[frame]),
+        Input::words("tiles", &tiles::random(&frame, bits, &mut Random(7))),
+        Input::floats("prescan", &prescan),
+    ];
     Job::of(&stages::CONVERT, given, Vec::new())
 }
 
 fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     let frame: Frame = job.one("frame");
     let converted = convert::convert(&frame, &job.get::<f32>("prescan"));
-    let mask: Vec<[f32; 2]> = job.after(outputs, "mask");
-    let background: Vec<f32> = job.after(outputs, "background");
+    let mut mask: Vec<[f32; 2]> = job.after(outputs, "mask");
+    let mut background: Vec<f32> = job.after(outputs, "background");
+    let tiles: Vec<u32> = job.get("tiles");
+    let across = frame.image_width.div_ceil(TILE);
+    let mut touched = 0;
+    let mut converted: Vec<[f64; 3]> =
+        converted.iter().map(|v| v.map_or([0.0; 3], |[mask, grey]| [mask, 1.0, grey])).collect();
+    for (at, expected) in converted.iter_mut().enumerate() {
+        let [i, j] = [at as u32 % frame.image_width, at as u32 / frame.image_width];
+        let tile = tiles[(j / TILE * across + i / TILE) as usize];
+        if tile & (TILE_BLURRED | TILE_WHOLE) == 0 {
+            touched += usize::from(mask[at].map(f32::to_bits) != [UNWRITTEN; 2]);
+            (mask[at], *expected) = ([0.0; 2], [0.0; 3]);
+        }
+        if tile & TILE_WHOLE == 0 {
+            touched += usize::from(background[at].to_bits() != UNWRITTEN);
+            (background[at], expected[2]) = (0.0, 0.0);
+        }
+    }
     let allowed = |i: usize| match display::near_edge(&frame, i) {
         true => 1.0,
         false => LEVEL,
     };
     // Beside a value that is not finite any result is allowed: its weight may be 0, and 0 times infinity is NaN.
-    let finite = |v: f64, got: f32| if v.is_finite() { v } else { f64::from(got) };
     let expected = |which: usize, got: &[f32]| -> Vec<f64> {
-        let values = converted.iter().zip(got);
-        let value = |(v, &got): (&Option<[f64; 2]>, &f32)| finite(v.map_or(0.0, |v| v[which]), got);
-        values.map(value).collect()
+        let finite = |(v, got): (&[f64; 3], &f32)| match v[which].is_finite() {
+            true => v[which],
+            false => f64::from(*got),
+        };
+        converted.iter().zip(got).map(finite).collect()
     };
-    let masks: Vec<f32> = mask.iter().map(|m| m[0]).collect();
-    let weights: Vec<f32> = mask.iter().map(|m| m[1]).collect();
-    let inside: Vec<f64> = converted.iter().map(|v| f64::from(u8::from(v.is_some()))).collect();
+    let [masks, weights] = [0, 1].map(|which| mask.iter().map(|m| m[which]).collect::<Vec<f32>>());
     vec![
         Check::close("mask", &masks, &expected(0, &masks), allowed),
-        Check::close("weight", &weights, &inside, |i| {
+        Check::close("weight", &weights, &expected(1, &weights), |i| {
             f64::from(u8::from(display::near_edge(&frame, i)))
         }),
-        Check::close("background", &background, &expected(1, &background), allowed),
+        Check::close("background", &background, &expected(2, &background), allowed),
+        Check::count("pixels beside what is wanted", masks.len(), touched, 0),
     ]
 }

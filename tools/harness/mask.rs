@@ -6,7 +6,10 @@ use super::inputs::{Random, scanlines, straight_frame};
 use super::worlds;
 use super::{Case, Check, Input, Job, Size, Subject, sizes};
 use crate::reference::mask;
-use insonify::sim::layout::{Fusion, Instance, MASK_SPEED_ENCLOSING, MASK_SPEED_PROBE};
+use insonify::sim::layout::{
+    Frame, Fusion, Instance, MASK_BLOCK, MASK_SPEED_ENCLOSING, MASK_SPEED_PROBE, TILE_ACQUIRED,
+    TILE_SIMULATED,
+};
 use insonify::sim::placement;
 use insonify::sim::stages;
 
@@ -116,10 +119,34 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     let shown: Vec<f32> = got.iter().map(|v| v[1]).collect();
     let expected: Vec<f64> = places.iter().map(|&p| mask::acquired(&fusion, &texels, p)).collect();
     let allowed = |i: usize| if at_end(places[i]) { 1.0 } else { LEVEL };
+    let blocks: Vec<u32> = job.after(outputs, "mask_blocks");
+    let (summed_up, otherwise) = blocks_of(&frame, &got, &lines);
+    let unlike = blocks.iter().zip(&summed_up).zip(&otherwise);
+    let unlike =
+        unlike.filter(|((got, own), most)| *own & !*got != 0 || *got & !(*own | *most) != 0);
     vec![
+        Check::count("blocks", summed_up.len(), unlike.count(), 0),
+        Check::equal("number of blocks", &[blocks.len()], &[summed_up.len()]),
         Check::count("mask", got.len(), wrong, 0),
         // Not more samples than lie so close by chance are left out; otherwise the comparison would allow any result.
         Check::count("samples at a crossing", got.len(), near, got.len() / 50),
         Check::close("grey level", &shown, &expected, allowed),
     ]
+}
+
+/// What each block of samples has: by its samples, and what crossings among them, or close to them, may add.
+fn blocks_of(frame: &Frame, got: &[[f32; 2]], lines: &[mask::Crossings]) -> (Vec<u32>, Vec<u32>) {
+    let (mut own, mut added) = (Vec::new(), Vec::new());
+    for (line, samples) in lines.iter().zip(got.chunks(frame.samples.max(1) as usize)) {
+        for (block, samples) in (0..).zip(samples.chunks(MASK_BLOCK as usize)) {
+            let bit = |mask: f32| if mask > 0.0 { TILE_ACQUIRED } else { TILE_SIMULATED };
+            own.push(samples.iter().fold(0, |has, &[mask, _]| has | bit(mask)));
+            let first = block * MASK_BLOCK;
+            let ends = [first, first + samples.len() as u32 - 1].map(|k| mask::depth(frame, k));
+            let near = ends[0] - EDGE..=ends[1] + EDGE;
+            let crossed = line.along.iter().any(|met| near.contains(&met.depth));
+            added.push(if crossed { TILE_ACQUIRED | TILE_SIMULATED } else { 0 });
+        }
+    }
+    (own, added)
 }

@@ -167,7 +167,7 @@ fn explain(counters: &[Counters; 2], [simulated, fused]: [f64; 2]) {
     };
     output::line(format_args!(
         "\nFusion saves {:.1} % of the frame; the paper saved {:.1} %. Work not done: rays {}, \
-         segments {}, scatterer cells {}. Added: mask, convert, blur, fuse.",
+         segments {}, scatterer cells {}. Added: mask, tiles, convert, blur; fuse in place of display.",
         100.0 * (1.0 - fused / simulated),
         100.0 * (1.0 - PAPER[1] / PAPER[0]),
         of(|c| c.rays),

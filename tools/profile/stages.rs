@@ -219,10 +219,8 @@ fn work(stage: &str, sizes: &Sizes, counters: &Counters) -> Option<Work> {
         // Baseband in, IQ and level out.
         "axial" => (20.0 * samples, (4.0 * axial + 35.0) * samples),
         "display" => (4.0 * samples + 4.0 * pixels, 60.0 * pixels),
-        "convert" => (8.0 * samples + 12.0 * pixels, 70.0 * pixels),
-        // Both runs: pairs in, pairs out.
-        "blur" => (32.0 * pixels, 24.0 * pixels),
-        "fuse" => (20.0 * pixels, 15.0 * pixels),
+        // How much `convert` and `blur` do depends on the border's length.
+        "fuse" => (12.0 * samples + 4.0 * pixels, 65.0 * pixels),
         _ => return None,
     };
     Some(Work { bytes, operations })

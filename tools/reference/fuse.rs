@@ -1,27 +1,23 @@
 //! Twin of `fuse`: the acquired image and the simulated one, mixed by the blurred mask.
 
-use insonify::sim::layout::{BLEND_MULTIBAND, BLEND_SMOOTH, Fusion};
+use insonify::sim::layout::{BLEND_SMOOTH, Fusion, TILE_ACQUIRED, TILE_SIMULATED};
 
-/// Weight of the acquired image from the box sums of mask and weight.
-pub fn weight(fusion: &Fusion, [mask, weight]: [f32; 2]) -> f64 {
-    let m = if mask >= weight { 1.0 } else { f64::from(mask) / f64::from(weight) };
-    if fusion.blend == BLEND_SMOOTH { m * m * (3.0 - 2.0 * m) } else { m }
+/// Share of the acquired image in a pixel of `tile`, from the box sums of mask and weight.
+pub fn share(fusion: &Fusion, tile: u32, [mask, weight]: [f32; 2]) -> f64 {
+    match tile & (TILE_ACQUIRED | TILE_SIMULATED) {
+        TILE_ACQUIRED => 1.0,
+        TILE_SIMULATED => 0.0,
+        _ => {
+            let m = if mask >= weight { 1.0 } else { f64::from(mask) / f64::from(weight) };
+            if fusion.blend == BLEND_SMOOTH { m * m * (3.0 - 2.0 * m) } else { m }
+        }
+    }
 }
 
-/// Grey level 0..=255 before rounding of one pixel inside the sector; none for NaN.
-/// `change` is the value that blending by bands adds to the acquired image.
-pub fn level(
-    fusion: &Fusion,
-    simulated: u32,
-    background: f32,
-    sums: [f32; 2],
-    change: f32,
-) -> Option<f64> {
-    let v = if fusion.blend == BLEND_MULTIBAND {
-        255.0 * (f64::from(background) + f64::from(change))
-    } else {
-        let m = weight(fusion, sums);
-        m * f64::from(background) * 255.0 + (1.0 - m) * f64::from(simulated & 0xff)
-    };
-    (!v.is_nan()).then(|| v.clamp(0.0, 255.0))
+/// Grey level before rounding of one pixel inside the sector, 0..=255; 0 for NaN. An image without a share does not
+/// count, whatever it has.
+pub fn level(share: f64, acquired: f64, simulated: f64) -> f64 {
+    let part = |share: f64, level: f64| if share > 0.0 { share * level } else { 0.0 };
+    let v = part(share, acquired) + part(1.0 - share, simulated);
+    if v.is_nan() { 0.0 } else { v.clamp(0.0, 255.0) }
 }

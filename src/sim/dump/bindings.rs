@@ -19,6 +19,7 @@ use crate::scene::Scene;
 /// triangle once: the ray query does not depend on their order, and a hit does not depend on other
 /// instances with the same triangle.
 pub(super) fn write(simulator: &mut Simulator, scene: &Scene, dir: &Path) -> Result<(), DumpError> {
+    simulator.complete_steps()?;
     let still = scene.still();
     let arrays = GeometryArrays::new(&still, Tracer::Bvh, Splits::Object, Fields::build(&still));
     let arrays = arrays.map_err(|e| SimError::World(e.into()))?;

@@ -32,12 +32,22 @@ impl Simulator {
             return Ok(Vec::new());
         };
         let mut dumped = vec![("acquired", fused.texture.read(acquired.now)?)];
-        if fused.banded {
+        if fused.bands.is_some() {
             let pixels = self.sizes().pixels() as usize;
             let change = self.device.read_back(fused.pyramid.change())?;
             dumped.push(("change", change[..4 * pixels].to_vec()));
         }
         Ok(dumped)
+    }
+
+    /// Makes the intermediate images of the last frame everywhere, if it showed an acquired volume: frames themselves make
+    /// them only around the border.
+    pub(in crate::sim) fn complete_steps(&mut self) -> Result<(), SimError> {
+        if self.fused {
+            self.submissions.wait()?;
+            self.device.once(|cmd| self.passes.fusion_steps(cmd))?;
+        }
+        Ok(())
     }
 
     /// The steps of the last frame, if it showed an acquired volume.
@@ -48,15 +58,19 @@ impl Simulator {
         if !self.fused {
             return Ok(None);
         }
-        let banded = self.lane().fusion.as_ref().is_some_and(|fused| fused.banded);
-        let mask = self.floats("mask")?;
-        let sums = self.floats(if banded { "mask" } else { "sums" })?;
+        self.complete_steps()?;
+        let banded = self.lane().fusion.as_ref().is_some_and(|fused| fused.bands.is_some());
+        let mut floats = |name| -> Result<Vec<f32>, SimError> {
+            Ok(bytemuck::pod_collect_to_vec(&self.read(name)?))
+        };
+        let mask = floats("mask")?;
+        let sums = floats(if banded { "mask" } else { "sums" })?;
         let (masks, _) = mask.as_chunks::<2>();
         let (sums, _) = sums.as_chunks::<2>();
         let mean = |s: &[f32; 2]| if s[1] > 0.0 { s[0] / s[1] } else { 0.0 };
         Ok(Some(FusionSteps {
-            prescan: self.floats("prescan")?,
-            background: self.floats("background")?,
+            prescan: floats("prescan")?,
+            background: floats("background")?,
             mask: masks.iter().map(|m| m[0]).collect(),
             blurred: sums.iter().map(mean).collect(),
             simulated: self.read("pixels")?,

@@ -10,7 +10,7 @@ use crate::scene::Scene;
 /// The stage; it runs once for each direction.
 pub const BLUR: Pass = Pass {
     name: "blur",
-    binds: &["frame", "fusion", "mask", "sums"],
+    binds: &["frame", "fusion", "mask", "sums", "tiles"],
     makes: &[
         Array::new("sums", Float, 2, Sizes::pixels),
         // Sums of the columns alone, stored column by column.

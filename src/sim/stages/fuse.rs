@@ -1,6 +1,7 @@
 //! `fuse`: simulated and acquired image mixed.
 
-use super::super::pass::{Array, Pass, Sizes, per_pixel};
+use super::super::pass::{Array, Pass, Sizes};
+use super::tiles::per_tile;
 use crate::gpu::Stage;
 use crate::output::npy::Element::Word;
 use crate::scene::Scene;
@@ -8,9 +9,20 @@ use crate::scene::Scene;
 /// The stage.
 pub const FUSE: Pass = Pass {
     name: "fuse",
-    binds: &["frame", "fusion", "pixels", "background", "sums", "fused", "change"],
+    binds: &[
+        "frame",
+        "fusion",
+        "log_image",
+        "grey",
+        "prescan",
+        "tiles",
+        "sums",
+        "fused",
+        "background",
+        "change",
+    ],
     makes: &[Array::new("fused", Word, 1, Sizes::pixels)],
-    extent: Some(per_pixel),
+    extent: Some(per_tile),
     then: Stage::Transfer,
     needed: Scene::shows_volume,
     ..Pass::USUAL

@@ -22,11 +22,13 @@ pub const MASK: Pass = Pass {
         "prescan",
         "scanlines",
         "tissues",
+        "mask_blocks",
     ],
     makes: &[
         Array::of::<Fusion>("fusion", Word, |_| 1),
         // Mask and grey level of every sample.
         Array::new("prescan", Float, 2, Sizes::samples),
+        Array::new("mask_blocks", Word, 1, Sizes::mask_blocks),
     ],
     extent: Some(|frame: &Frame| Extent::Groups([frame.scanlines, 1, 1])),
     needed: Scene::shows_volume,

@@ -75,9 +75,10 @@ impl Pyramid {
 }
 
 impl Passes {
-    /// Computes [`Pyramid::change`] over `top` levels above the finest.
-    pub(in crate::sim) fn bands(&self, cmd: &mut Commands<'_>, top: u32) -> Result<(), GpuError> {
-        let top = top as usize;
+    /// Computes [`Pyramid::change`].
+    pub(in crate::sim) fn bands(&self, cmd: &mut Commands<'_>) -> Result<(), GpuError> {
+        let fusion = self.lanes[0].fusion.as_ref();
+        let top = fusion.and_then(|fusion| fusion.bands).expect("blended by bands") as usize;
         let size = [self.frame().image_width, self.frame().image_height];
         let threads = |level: usize| {
             let [width, height] = size_at(size, level);

@@ -9,7 +9,7 @@ use crate::output::npy::Element::Word;
 /// The stage.
 pub const TINT: Pass = Pass {
     name: "tint",
-    binds: &["frame", "fusion", "fused", "mask", "sums", "tinted"],
+    binds: &["frame", "fusion", "fused", "mask", "sums", "tiles", "tinted"],
     makes: &[Array::new("tinted", Word, 1, Sizes::pixels)],
     extent: Some(per_pixel),
     then: Stage::Transfer,

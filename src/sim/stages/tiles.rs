@@ -1,0 +1,58 @@
+//! `tiles`: which of both images each tile of a fused image shows.
+
+use super::super::layout::{Frame, MASK_BLOCK, TILE};
+use super::super::pass::{Array, Extent, Pass, Sizes};
+use super::super::passes::Passes;
+use crate::gpu::{Commands, GpuError};
+use crate::output::npy::Element::Word;
+use crate::scene::Scene;
+
+/// The stage.
+pub const TILES: Pass = Pass {
+    name: "tiles",
+    binds: &["frame", "fusion", "mask_blocks", "tiles"],
+    makes: &[Array::new("tiles", Word, 1, |s| s.tiles()).zeroed()],
+    extent: Some(|frame| {
+        let [across, down] = tiles(frame);
+        Extent::Threads([across, down, 1])
+    }),
+    needed: Scene::shows_volume,
+    ..Pass::USUAL
+};
+
+/// Tiles of an image, across and down.
+pub fn tiles(frame: &Frame) -> [u32; 2] {
+    [frame.image_width, frame.image_height].map(|pixels| pixels.div_ceil(TILE))
+}
+
+/// One work group per tile.
+pub(super) fn per_tile(frame: &Frame) -> Extent {
+    let [across, down] = tiles(frame);
+    Extent::Groups([across, down, 1])
+}
+
+impl Sizes {
+    /// Tiles of the image.
+    fn tiles(&self) -> u64 {
+        tiles(&self.frame).map(u64::from).iter().product()
+    }
+
+    /// Blocks of samples of all scanlines.
+    pub(super) fn mask_blocks(&self) -> u64 {
+        u64::from(self.frame.scanlines) * u64::from(self.frame.samples.div_ceil(MASK_BLOCK))
+    }
+}
+
+impl Passes {
+    /// Sorts the tiles; if `whole`, every intermediate image is then made everywhere.
+    pub(in crate::sim) fn tiles(
+        &self,
+        cmd: &mut Commands<'_>,
+        whole: bool,
+    ) -> Result<(), GpuError> {
+        cmd.scope(TILES.name);
+        let extent = TILES.extent.expect("stated above")(self.frame());
+        let push = u32::from(whole);
+        self.record(cmd, &TILES, extent, bytemuck::bytes_of(&push), &|_| Vec::new())
+    }
+}
