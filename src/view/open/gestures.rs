@@ -1,6 +1,12 @@
 //! Input in steps that the interface understands: press, movement and release apart, and what is typed after a click.
 
-use egui::{Event, Key, RawInput};
+use egui::{Context, Event, Key, RawInput};
+
+/// Has press and release in one place be a click however long they lie apart: egui measures that by the times of its
+/// passes, and on a slow machine the pass with the release may begin a second after that with the press.
+pub(super) fn click_slowly(context: &Context) {
+    context.options_mut(|options| options.input_options.max_click_duration = f64::INFINITY);
+}
 
 /// The input in passes, to be given to the interface one after the other: in none does the pointer move before or
 /// after a button changes, and nothing is typed after a click or a key that may have moved the keyboard to another field,
@@ -43,7 +49,7 @@ fn leaves_field(event: &Event) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use egui::{Context, Modifiers, PointerButton, Pos2, Rect, Sense, Vec2, pos2};
+    use egui::{Modifiers, PointerButton, Pos2, Rect, Sense, Vec2, pos2};
 
     fn moved(x: f32) -> Event {
         Event::PointerMoved(pos2(x, 50.0))
@@ -101,6 +107,20 @@ mod tests {
         let events = vec![moved(100.0), button(100.0, true), button(100.0, false), moved(5.0)];
         let (by, clicks) = drawn(&context, passes(input(events)));
         assert_eq!((by, clicks), (Vec2::ZERO, 1));
+    }
+
+    #[test]
+    fn a_click_that_takes_two_slow_pictures_is_one() {
+        let clicks = |context: &Context| {
+            let events =
+                [vec![moved(100.0)], vec![button(100.0, true)], vec![button(100.0, false)]];
+            let at = |(i, events)| RawInput { time: Some(2.0 * f64::from(i)), ..input(events) };
+            drawn(context, (0u32..).zip(events).map(at).collect()).1
+        };
+        assert_eq!(clicks(&Context::default()), 0, "as egui has it");
+        let context = Context::default();
+        click_slowly(&context);
+        assert_eq!(clicks(&context), 1);
     }
 
     #[test]

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use winit::event_loop::ActiveEventLoop;
 use winit::window::Window;
 
-use super::{Open, Plan};
+use super::{Open, Plan, gestures};
 use crate::gpu::{Device, ValidationLog};
 use crate::output;
 use crate::sim;
@@ -31,6 +31,7 @@ fn interface(window: &Window, zoom: f32, device: &Device) -> egui_winit::State {
     context.set_zoom_factor(zoom);
     let scale = window.scale_factor() as f32;
     style::apply(&context);
+    gestures::click_slowly(&context);
     let root = egui::ViewportId::ROOT;
     let limit = device.limits().max_image_2d as usize;
     egui_winit::State::new(context, root, window, Some(scale), None, Some(limit))
