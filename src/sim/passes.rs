@@ -11,15 +11,11 @@ use super::layout::{self, ROLE_BRANCHES};
 use super::line::OneLine;
 use super::pass::{Extent, Pass, Sizes, Variants};
 use super::shaders::Library;
-use super::stages::{
-    self, APERTURE, CONVERT, DARKEN, DISPLAY, EXPECT, FUSE, MASK, ORIGIN, SCATTER, SHADOW, TRACE,
-    aperture, scatter,
-};
+use super::stages::{self, APERTURE, EXPECT, ORIGIN, SCATTER, TRACE, aperture, scatter};
 use super::tables::Tables;
 use super::{SimError, World};
 use crate::gpu::{Binding, Buffer, Commands, Device, GpuError, Kernel, Stage};
-use crate::scene::{Fusion, Scene};
-use crate::settings::Blend;
+use crate::scene::Scene;
 
 /// For a lane, the buffers that a dispatch binds instead of those of the same names.
 pub(super) type Instead<'g> = &'g dyn Fn(&Lane) -> Vec<(&'static str, &Buffer)>;
@@ -189,7 +185,7 @@ impl Passes {
         }
     }
 
-    fn loses_by_aperture(&self) -> bool {
+    pub(super) fn loses_by_aperture(&self) -> bool {
         self.frame().flags & layout::FLAG_APERTURE != 0
     }
 
@@ -214,7 +210,11 @@ impl Passes {
     }
 
     /// Records what the aperture lets through, of `apertures` or what is bound instead.
-    fn converge(&self, cmd: &mut Commands, instead: Instead<'_>) -> Result<(), GpuError> {
+    pub(super) fn converge(
+        &self,
+        cmd: &mut Commands,
+        instead: Instead<'_>,
+    ) -> Result<(), GpuError> {
         cmd.scope(APERTURE.name);
         let [threads, ..] = self.kernels.of(&APERTURE, self.world.deforms()).local_size();
         let groups = aperture::extent(self.frame(), self.batches.rounds.at_once / threads);
@@ -243,59 +243,6 @@ impl Passes {
             self.record(cmd, &TRACE[round.role as usize], threads, push, &|_| Vec::new())?;
         }
         Ok(())
-    }
-
-    /// Records the images mixed with the acquired volume.
-    pub(super) fn fuse(&self, cmd: &mut Commands, fusion: &Fusion) -> Result<(), GpuError> {
-        self.run(cmd, &MASK)?;
-        if fusion.background_shadows {
-            self.run(cmd, &SHADOW)?;
-            if self.loses_by_aperture() {
-                self.converge(cmd, &|lane| vec![("apertures", &lane.buffers["shades"])])?;
-            }
-            self.run(cmd, &DARKEN)?;
-        }
-        self.mixed_by(cmd, fusion.blend)?;
-        self.run_with(cmd, &FUSE, &|lane| {
-            // Not read without blending by bands.
-            let change = match fusion.blend {
-                Blend::Multiband => lane.pyramid().change(),
-                Blend::Linear | Blend::Smooth => &lane.buffers["background"],
-            };
-            vec![("prescan", lane.prescan()), ("change", change)]
-        })
-    }
-
-    /// Records what says how the images are mixed.
-    fn mixed_by(&self, cmd: &mut Commands, blend: Blend) -> Result<(), GpuError> {
-        match blend {
-            Blend::Multiband => {
-                self.convert(cmd, true)?;
-                self.bands(cmd)
-            }
-            Blend::Linear | Blend::Smooth => {
-                self.convert(cmd, false)?;
-                self.blur(cmd)
-            }
-        }
-    }
-
-    /// Records the scan conversion of the mask where it is blurred; if `whole`, that of the mask, the acquired and the
-    /// simulated image everywhere.
-    fn convert(&self, cmd: &mut Commands, whole: bool) -> Result<(), GpuError> {
-        self.tiles(cmd, whole)?;
-        if whole {
-            self.run(cmd, &DISPLAY)?;
-            // Its output is read by kernels here, not only copied.
-            cmd.barrier(Stage::Compute, Stage::Compute);
-        }
-        self.run_with(cmd, &CONVERT, &|lane| vec![("prescan", lane.prescan())])
-    }
-
-    /// Records the intermediate images of the last fused frame, which that has made only where it needed them.
-    pub(super) fn fusion_steps(&self, cmd: &mut Commands) -> Result<(), GpuError> {
-        self.convert(cmd, true)?;
-        self.blur(cmd)
     }
 
     /// Records copies of results of a frame of these sizes that were read of the frame before.

@@ -1,10 +1,13 @@
 //! `fuse`: simulated and acquired image mixed.
 
 use super::super::pass::{Array, Pass, Sizes};
+use super::super::passes::Passes;
 use super::tiles::per_tile;
-use crate::gpu::Stage;
+use super::{CONVERT, DARKEN, DISPLAY, MASK, SHADOW};
+use crate::gpu::{Commands, GpuError, Stage};
 use crate::output::npy::Element::Word;
-use crate::scene::Scene;
+use crate::scene::{Fusion, Scene};
+use crate::settings::Blend;
 
 /// The stage.
 pub const FUSE: Pass = Pass {
@@ -27,3 +30,62 @@ pub const FUSE: Pass = Pass {
     needed: Scene::shows_volume,
     ..Pass::USUAL
 };
+
+impl Passes {
+    /// Records the images mixed with the acquired volume.
+    pub(in crate::sim) fn fuse(
+        &self,
+        cmd: &mut Commands<'_>,
+        fusion: &Fusion,
+    ) -> Result<(), GpuError> {
+        self.run(cmd, &MASK)?;
+        if fusion.background_shadows {
+            self.run(cmd, &SHADOW)?;
+            if self.loses_by_aperture() {
+                self.converge(cmd, &|lane| vec![("apertures", &lane.buffers["shades"])])?;
+            }
+            self.run(cmd, &DARKEN)?;
+        }
+        self.mixed_by(cmd, fusion.blend)?;
+        self.run_with(cmd, &FUSE, &|lane| {
+            // Not read without blending by bands.
+            let change = match fusion.blend {
+                Blend::Multiband => lane.pyramid().change(),
+                Blend::Linear | Blend::Smooth => &lane.buffers["background"],
+            };
+            vec![("prescan", lane.prescan()), ("change", change)]
+        })
+    }
+
+    /// Records what says how the images are mixed.
+    fn mixed_by(&self, cmd: &mut Commands<'_>, blend: Blend) -> Result<(), GpuError> {
+        match blend {
+            Blend::Multiband => {
+                self.convert(cmd, true)?;
+                self.bands(cmd)
+            }
+            Blend::Linear | Blend::Smooth => {
+                self.convert(cmd, false)?;
+                self.blur(cmd)
+            }
+        }
+    }
+
+    /// Records the scan conversion of the mask where it is blurred; if `whole`, that of the mask, the acquired and the
+    /// simulated image everywhere.
+    fn convert(&self, cmd: &mut Commands<'_>, whole: bool) -> Result<(), GpuError> {
+        self.tiles(cmd, whole)?;
+        if whole {
+            self.run(cmd, &DISPLAY)?;
+            // Its output is read by kernels here, not only copied.
+            cmd.barrier(Stage::Compute, Stage::Compute);
+        }
+        self.run_with(cmd, &CONVERT, &|lane| vec![("prescan", lane.prescan())])
+    }
+
+    /// Records the intermediate images of the last fused frame, which that has made only where it needed them.
+    pub(in crate::sim) fn fusion_steps(&self, cmd: &mut Commands<'_>) -> Result<(), GpuError> {
+        self.convert(cmd, true)?;
+        self.blur(cmd)
+    }
+}
