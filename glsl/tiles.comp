@@ -63,7 +63,7 @@ void main() {
         atomicOr(tiles[at], TILE_ACQUIRED | TILE_SIMULATED | TILE_BLURRED | TILE_WHOLE);
         return;
     }
-    // Boxes reach half their edge, up and to the left that of an even one rounded up.
+    // Boxes reach as far up and to the left, and no farther down and to the right.
     ivec2 reach = ivec2(fusion.blur / 2u);
     ivec2 first = max(ivec2(here * TILE) - reach, ivec2(0));
     ivec2 last = min(ivec2((here + 1u) * TILE - 1u) + reach, ivec2(size) - 1);

@@ -366,21 +366,27 @@ fn render_warns_of_a_mask_off_the_image_and_shows_the_steps() {
     assert_eq!(fused[1], level("6_background.png", 10, 190));
 }
 
-/// Pixels of a fused image that are not the mix of its whole steps; a rounding either side of the middle between two
-/// greys will do.
+/// Share of the acquired image, from the blurred mask.
+fn weight(blurred: f32, is_smooth: bool) -> f64 {
+    // Scan conversion may leave a mask a rounding above 1.
+    let m = f64::from(blurred).min(1.0);
+    if is_smooth { m * m * (3.0 - 2.0 * m) } else { m }
+}
+
+/// Number of pixels of a fused image that are not the mix of its whole steps, where a rounding either side of the middle
+/// between two greys will do; and of those that are simulated, mixed and acquired.
 fn unlike_the_steps(simulator: &mut Simulator, is_smooth: bool) -> (usize, [usize; 3]) {
     let (_, _, shown) = simulator.pixels().expect("pixels");
     let steps = simulator.fusion_steps().expect("read").expect("fused");
     let (mut wrong, mut kinds) = (0, [0; 3]);
     for (i, pixel) in shown.chunks_exact(4).enumerate() {
-        let simulated = steps.simulated[4 * i..][..4].to_vec();
+        let simulated = &steps.simulated[4 * i..][..4];
         if simulated[3] == 0 {
             wrong += usize::from(pixel != [0; 4]);
             continue;
         }
-        let m = f64::from(steps.blurred[i]).min(1.0);
+        let m = weight(steps.blurred[i], is_smooth);
         kinds[if m == 0.0 { 0 } else { 1 + usize::from(m == 1.0) }] += 1;
-        let m = if is_smooth { m * m * (3.0 - 2.0 * m) } else { m };
         let level =
             255.0 * m * f64::from(steps.background[i]) + (1.0 - m) * f64::from(simulated[0]);
         wrong += usize::from((level - f64::from(pixel[0])).abs() > 0.501 || pixel[3] != 255);
@@ -586,9 +592,7 @@ fn a_bone_throws_its_shadow_into_a_real_acquired_volume() {
 
 /// Levels of a pixel under a colour; `share` of it is acquired, before the blend's curve.
 fn tint_of(grey: &[u8], tint: &Tint, share: f32, is_smooth: bool) -> [f64; 3] {
-    // Scan conversion may leave a mask a rounding above 1.
-    let m = f64::from(share).min(1.0);
-    let m = if is_smooth { m * m * (3.0 - 2.0 * m) } else { m };
+    let m = weight(share, is_smooth);
     std::array::from_fn(|i| {
         let grey = f64::from(grey[i]);
         grey + f64::from(tint.opacity) * m * (f64::from(tint.colour[i]) - grey)

@@ -3,8 +3,8 @@
 use super::display;
 use super::inputs::Random;
 use super::{Case, Check, Extent, Input, Job, Size, Subject, UNWRITTEN, tiles};
-use crate::reference::blur;
-use insonify::sim::layout::{Frame, Fusion, TILE, TILE_ACQUIRED, TILE_BLURRED, TILE_SIMULATED};
+use crate::reference::{blur, tiles as twin};
+use insonify::sim::layout::{Frame, Fusion, TILE_ACQUIRED, TILE_BLURRED, TILE_SIMULATED};
 use insonify::sim::stages;
 
 pub const SUBJECT: Subject = Subject {
@@ -77,15 +77,14 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     let mask: Vec<f32> = job.get("mask");
     let mut sums = blur::blur(&frame, &fusion, &mask, turned(job));
     let mut got: Vec<[f32; 2]> = job.after(outputs, "sums");
-    let tiles: Vec<u32> = job.get("tiles");
+    let kinds: Vec<u32> = job.get("tiles");
     let [_, height] = blur::dimensions(&frame, turned(job));
-    let across = frame.image_width.div_ceil(TILE);
     let mut touched = 0;
     for (at, (sum, got)) in sums.iter_mut().zip(&mut got).enumerate() {
         // The source's column and row.
         let [x, y] = [at as u32 / height, at as u32 % height];
         let [i, j] = if turned(job) { [y, x] } else { [x, y] };
-        if tiles[(j / TILE * across + i / TILE) as usize] & wanted(job) != wanted(job) {
+        if kinds[twin::of_pixel(&frame, i, j)] & wanted(job) != wanted(job) {
             touched += usize::from(got.map(f32::to_bits) != [UNWRITTEN; 2]);
             (*sum, *got) = ([0.0; 2], [0.0; 2]);
         }

@@ -3,8 +3,8 @@
 use super::display;
 use super::inputs::{Random, samples};
 use super::{Case, Check, Input, Job, Size, Subject, UNWRITTEN, tiles};
-use crate::reference::convert;
-use insonify::sim::layout::{Frame, TILE, TILE_BLURRED, TILE_WHOLE};
+use crate::reference::{convert, tiles as twin};
+use insonify::sim::layout::{Frame, TILE_BLURRED, TILE_WHOLE};
 use insonify::sim::stages;
 
 /// Largest difference of levels, as in `display`: white noise, positions exact to about 1e-6 of the image.
@@ -46,14 +46,13 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     let converted = convert::convert(&frame, &job.get::<f32>("prescan"));
     let mut mask: Vec<[f32; 2]> = job.after(outputs, "mask");
     let mut background: Vec<f32> = job.after(outputs, "background");
-    let tiles: Vec<u32> = job.get("tiles");
-    let across = frame.image_width.div_ceil(TILE);
+    let kinds: Vec<u32> = job.get("tiles");
     let mut touched = 0;
     let mut converted: Vec<[f64; 3]> =
         converted.iter().map(|v| v.map_or([0.0; 3], |[mask, grey]| [mask, 1.0, grey])).collect();
     for (at, expected) in converted.iter_mut().enumerate() {
         let [i, j] = [at as u32 % frame.image_width, at as u32 / frame.image_width];
-        let tile = tiles[(j / TILE * across + i / TILE) as usize];
+        let tile = kinds[twin::of_pixel(&frame, i, j)];
         if tile & (TILE_BLURRED | TILE_WHOLE) == 0 {
             touched += usize::from(mask[at].map(f32::to_bits) != [UNWRITTEN; 2]);
             (mask[at], *expected) = ([0.0; 2], [0.0; 3]);

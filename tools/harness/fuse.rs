@@ -3,9 +3,9 @@
 use super::display;
 use super::inputs::{Random, samples};
 use super::{Case, Check, Input, Job, Size, Subject, sizes, tiles};
-use crate::reference::{display as scan, fuse};
+use crate::reference::{display as scan, fuse, tiles as twin};
 use insonify::sim::layout::{
-    BLEND_LINEAR, BLEND_MULTIBAND, BLEND_SMOOTH, Frame, Fusion, TILE, TILE_ACQUIRED, TILE_SIMULATED,
+    BLEND_LINEAR, BLEND_MULTIBAND, BLEND_SMOOTH, Frame, Fusion, TILE_ACQUIRED, TILE_SIMULATED,
 };
 use insonify::sim::stages;
 
@@ -112,22 +112,21 @@ impl Right<'_> {
 fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     let (frame, fusion): (Frame, Fusion) = (job.one("frame"), job.one("fusion"));
     let prescan: Vec<[f32; 2]> = job.get("prescan");
-    let twin = Right {
+    let expected = Right {
         frame: &frame,
         log_image: job.get("log_image"),
         grey: job.get("grey"),
         acquired: prescan.iter().map(|p| p[1]).collect(),
     };
-    let tiles: Vec<u32> = job.get("tiles");
+    let kinds: Vec<u32> = job.get("tiles");
     let background: Vec<f32> = job.get("background");
     let sums: Vec<[f32; 2]> = job.get("sums");
     let change: Vec<f32> = job.get("change");
     let got: Vec<u32> = job.after(outputs, "fused");
     let places = scan::places(&frame);
-    let across = frame.image_width.div_ceil(TILE) as usize;
     let right = |i: usize| {
-        let [x, y] = [i % frame.image_width as usize, i / frame.image_width as usize];
-        let tile = tiles[y / TILE as usize * across + x / TILE as usize];
+        let [x, y] = [i as u32 % frame.image_width, i as u32 / frame.image_width];
+        let tile = kinds[twin::of_pixel(&frame, x, y)];
         let Some(place) = places[i].filter(|_| tile & (TILE_ACQUIRED | TILE_SIMULATED) != 0) else {
             return got[i] == 0;
         };
@@ -136,7 +135,7 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
                 let v = 255.0 * (f64::from(background[i]) + f64::from(change[i]));
                 [fuse::level(1.0, v, 0.0); 2]
             }
-            _ => twin.levels(place, fuse::share(&fusion, tile, sums[i])),
+            _ => expected.levels(place, fuse::share(&fusion, tile, sums[i])),
         };
         let [low, high] =
             [low - ROUNDING, high + ROUNDING].map(|v| (v.max(0.0) + 0.5).floor() as u32);

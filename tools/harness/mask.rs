@@ -134,7 +134,7 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     ]
 }
 
-/// What each block of samples has: by its samples, and what crossings among them, or close to them, may add.
+/// Bits of each block of samples: those that its samples have, and those that crossings among or close to them may add.
 fn blocks_of(frame: &Frame, got: &[[f32; 2]], lines: &[mask::Crossings]) -> (Vec<u32>, Vec<u32>) {
     let (mut own, mut added) = (Vec::new(), Vec::new());
     for (line, samples) in lines.iter().zip(got.chunks(frame.samples.max(1) as usize)) {

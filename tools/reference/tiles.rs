@@ -6,13 +6,19 @@ use super::display;
 use insonify::sim::layout::{Frame, Fusion, MASK_BLOCK, TILE, TILE_ACQUIRED, TILE_SIMULATED};
 use insonify::sim::stages::tiles;
 
+/// Index of the tile of pixel (i, j).
+pub fn of_pixel(frame: &Frame, i: u32, j: u32) -> usize {
+    (j / TILE * tiles::tiles(frame)[0] + i / TILE) as usize
+}
+
 /// Pixels of tile `index` along an axis of `size` pixels, and those that the boxes around them reach.
 fn reached(fusion: &Fusion, index: u32, size: u32) -> Range<u32> {
     let reach = fusion.blur / 2;
     (index * TILE).saturating_sub(reach)..((index + 1) * TILE + reach).min(size)
 }
 
-/// What the blocks of mask have that pixels of each tile read, or pixels that boxes around them reach; row by row.
+/// Bits of each tile, row by row: those of the blocks of mask that its pixels read, or pixels that boxes around them
+/// reach.
 pub fn seen(frame: &Frame, fusion: &Fusion, mask_blocks: &[u32]) -> Vec<u32> {
     let blocks = frame.samples.div_ceil(MASK_BLOCK);
     let of_pixel = |place: Option<[f64; 2]>| {
