@@ -331,6 +331,11 @@ impl Frame {
     pub fn face_lines(&self) -> u32 {
         self.scanlines + self.lines_beside
     }
+
+    /// Tiles of the image, across and down.
+    pub fn tiles(&self) -> [u32; 2] {
+        [self.image_width, self.image_height].map(|pixels| pixels.div_ceil(TILE))
+    }
 }
 
 /// `interpolate` writes the weighted sum of vectors as it is.

@@ -40,7 +40,7 @@ pub(super) mod paint;
 pub(super) mod pyramid;
 pub mod scatter;
 mod shadow;
-pub mod tiles;
+mod tiles;
 pub(super) mod tint;
 mod trace;
 

@@ -17,7 +17,7 @@ pub const SUBJECT: Subject = Subject {
     job,
     check,
     plant: |job, outputs| {
-        let [across, down] = stages::tiles::tiles(&job.one("frame")).map(|n| n as usize);
+        let [across, down] = job.one::<Frame>("frame").tiles().map(|n| n as usize);
         job.edit(outputs, "tiles", |tiles: &mut [u32]| {
             tiles[down / 2 * across + across / 2] &= !BOTH
         });
@@ -27,7 +27,7 @@ pub const SUBJECT: Subject = Subject {
 
 /// Tiles of an image with bits chosen at random, among `bits`.
 pub(super) fn random(frame: &Frame, bits: &[u32], random: &mut Random) -> Vec<u32> {
-    let [across, down] = stages::tiles::tiles(frame);
+    let [across, down] = frame.tiles();
     (0..across * down).map(|_| bits[random.word() as usize % bits.len()]).collect()
 }
 

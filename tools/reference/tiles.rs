@@ -4,11 +4,10 @@ use std::ops::Range;
 
 use super::display;
 use insonify::sim::layout::{Frame, Fusion, MASK_BLOCK, TILE, TILE_ACQUIRED, TILE_SIMULATED};
-use insonify::sim::stages::tiles;
 
 /// Index of the tile of pixel (i, j).
 pub fn of_pixel(frame: &Frame, i: u32, j: u32) -> usize {
-    (j / TILE * tiles::tiles(frame)[0] + i / TILE) as usize
+    (j / TILE * frame.tiles()[0] + i / TILE) as usize
 }
 
 /// Pixels of tile `index` along an axis of `size` pixels, and those that the boxes around them reach.
@@ -33,7 +32,7 @@ pub fn seen(frame: &Frame, fusion: &Fusion, mask_blocks: &[u32]) -> Vec<u32> {
     };
     let pixels: Vec<u32> =
         display::places(frame).into_iter().map(|p| of_pixel(p).unwrap_or(0)).collect();
-    let [across, down] = tiles::tiles(frame);
+    let [across, down] = frame.tiles();
     let mut out = Vec::new();
     for y in 0..down {
         for x in 0..across {
@@ -48,7 +47,7 @@ pub fn seen(frame: &Frame, fusion: &Fusion, mask_blocks: &[u32]) -> Vec<u32> {
 
 /// The tiles that boxes around pixels of tiles with both images reach, of tiles that show `seen`.
 pub fn blurred(frame: &Frame, fusion: &Fusion, seen: &[u32]) -> Vec<bool> {
-    let [across, down] = tiles::tiles(frame);
+    let [across, down] = frame.tiles();
     let mut out = vec![false; seen.len()];
     for (at, _) in
         seen.iter().enumerate().filter(|(_, seen)| **seen == TILE_ACQUIRED | TILE_SIMULATED)

@@ -1,6 +1,6 @@
 //! `tiles`: which of both images each tile of a fused image shows.
 
-use super::super::layout::{Frame, MASK_BLOCK, TILE};
+use super::super::layout::{Frame, MASK_BLOCK};
 use super::super::pass::{Array, Extent, Pass, Sizes};
 use super::super::passes::Passes;
 use crate::gpu::{Commands, GpuError};
@@ -13,28 +13,23 @@ pub const TILES: Pass = Pass {
     binds: &["frame", "fusion", "mask_blocks", "tiles"],
     makes: &[Array::new("tiles", Word, 1, |s| s.tiles()).zeroed()],
     extent: Some(|frame| {
-        let [across, down] = tiles(frame);
+        let [across, down] = frame.tiles();
         Extent::Threads([across, down, 1])
     }),
     needed: Scene::shows_volume,
     ..Pass::USUAL
 };
 
-/// Tiles of an image, across and down.
-pub fn tiles(frame: &Frame) -> [u32; 2] {
-    [frame.image_width, frame.image_height].map(|pixels| pixels.div_ceil(TILE))
-}
-
 /// One work group per tile.
 pub(super) fn per_tile(frame: &Frame) -> Extent {
-    let [across, down] = tiles(frame);
+    let [across, down] = frame.tiles();
     Extent::Groups([across, down, 1])
 }
 
 impl Sizes {
     /// Tiles of the image.
     fn tiles(&self) -> u64 {
-        tiles(&self.frame).map(u64::from).iter().product()
+        self.frame.tiles().map(u64::from).iter().product()
     }
 
     /// Blocks of samples of all scanlines.
