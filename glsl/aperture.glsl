@@ -1,8 +1,7 @@
-// Losses by the aperture: what a main path has lost on the way counts by the part of the aperture that it lies in front of.
+// What lies on the way counts by the part of the aperture that it lies in front of: losses, and surfaces that bend rays.
 //
-// The includer declares frame and apertures[]: for each layer, node and scanline the factor on amplitudes, in nepers, and
-// the nepers that the main path itself has lost. Node n lies n / APERTURE_BANDS of the way down. APERTURES is the name of another
-// array for them.
+// The includer declares frame and apertures[], by layer, node and scanline. Node n lies n / APERTURE_BANDS of the way down.
+// APERTURES is the name of another array for them.
 
 #ifndef APERTURES
 #define APERTURES apertures
@@ -26,15 +25,27 @@ float shade_lost(vec4 piece, float kappa) {
     return clamp(piece.z * (kappa - piece.x) - piece.y, lost_of(1e20), lost_of(0.0));
 }
 
+// A one-way time in bands; the last node at most.
+float bands_at(float time) {
+    return clamp(mix(0.0, time * frame.speed / frame.depth, time > 0.0), 0.0, 1.0) * float(APERTURE_BANDS);
+}
+
 // Factor on amplitudes of a line at a one-way time, in nepers, where its main path has lost `lost` nepers. Between two nodes
 // it changes with the depth, but where a surface takes much away, with that: in front of it is what was at the node before.
 float aperture_nepers(uint line, float time, float lost) {
-    float at = clamp(mix(0.0, time * frame.speed / frame.depth, time > 0.0), 0.0, 1.0) * float(APERTURE_BANDS);
+    float at = bands_at(time);
     uint node = min(uint(whole(floor(at))), APERTURE_BANDS - 1u);
-    vec2 above = APERTURES[aperture_at(line, node)];
-    vec2 below = APERTURES[aperture_at(line, node + 1u)];
-    float jump = below.y - above.y;
+    uint above = aperture_at(line, node), below = aperture_at(line, node + 1u);
+    float lost_above = APERTURES[above].lost;
+    float jump = APERTURES[below].lost - lost_above;
     float part = at - float(node);
-    if (jump > APERTURE_JUMP) part = clamp((lost - above.y) / jump, 0.0, 1.0);
-    return mix(above.x, below.x, part);
+    if (jump > APERTURE_JUMP) part = clamp((lost - lost_above) / jump, 0.0, 1.0);
+    return mix(APERTURES[above].gain, APERTURES[below].gain, part);
+}
+
+// Factor on the amplitude of speckle of a line at a one-way time, in nepers, by surfaces that bend its beam.
+float aperture_level(uint line, float time) {
+    float at = bands_at(time);
+    uint node = min(uint(whole(floor(at))), APERTURE_BANDS - 1u);
+    return mix(APERTURES[aperture_at(line, node)].level, APERTURES[aperture_at(line, node + 1u)].level, at - float(node));
 }

@@ -9,7 +9,7 @@ layout(std430, binding = 0) readonly buffer FrameBuffer { Frame frame; };
 layout(std430, binding = 1) readonly buffer PieceBuffer { vec4 pieces[]; };
 layout(std430, binding = 2) readonly buffer PrescanBuffer { float prescan[]; };
 layout(std430, binding = 3) buffer ShadedBuffer { float shaded[]; };
-layout(std430, binding = 4) readonly buffer ShadeBuffer { vec2 shades[]; };
+layout(std430, binding = 4) readonly buffer ShadeBuffer { Aperture shades[]; };
 
 #include "numbers.glsl"
 #define APERTURES shades

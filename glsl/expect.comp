@@ -17,7 +17,7 @@ layout(std430, binding = 7) restrict readonly buffer SpeckleBuffer { float speck
 // Power that came straight, and power that was reflected before: 64 bits each, the lower half first.
 layout(std430, binding = 8) restrict buffer ExpectedBuffer { uvec4 expected[]; };
 
-layout(std430, binding = 9) restrict readonly buffer ApertureBuffer { vec2 apertures[]; };
+layout(std430, binding = 9) restrict readonly buffer ApertureBuffer { Aperture apertures[]; };
 
 #include "transform.glsl"
 #include "probe.glsl"
@@ -47,7 +47,10 @@ float power_of(Stretch s, uint k, uint layer) {
     float amplitude = s.weight * thinning(s, x, k) * exp(-s.absorption * x) * exp2(tissues[s.tissue].level);
     float power = amplitude * amplitude;
     // In faster tissue a sample is longer and holds more scatterers.
-    if ((frame.flags & FLAG_VOXEL) == 0u) power *= s.speed / frame.speed * spoiled(s, x, k);
+    if ((frame.flags & FLAG_VOXEL) == 0u) {
+        float level = scattered(s, x, k);
+        power *= s.speed / frame.speed * level * level;
+    }
     return power * (to - from) * speckle[k * frame.layers + layer];
 }
 

@@ -15,6 +15,7 @@ struct Interface {
     vec3 geometric; vec3 shading;
     vec3 refracting;                // averaged over the wavefront
     vec3 turning;                   // its change per mm across
+    vec3 ray;                       // averaged over what a ray of the aperture stands for: it turns by this
     float reflectance;
     float turn;                     // deviation of the reflected direction over the beam
     bool curved;                    // over the beam: something gets through beside a totally reflected middle
@@ -82,11 +83,12 @@ void meet(out Interface at, Met here, bool entering, inout Path path, uint befor
     at.surface = entering ? instances[hit.instance].surface_outside : instances[hit.instance].surface_inside;
     at.before = before;
     at.behind = behind;
-    Slope slope = slope_at(here, path, row_of(path.time), path.spread.x);
+    Slope slope = slope_at(here, path, row_of(path.time), path.spread.x, goes_on_in_shadow());
     at.geometric = slope.geometric;
     at.shading = slope.shading;
     at.refracting = slope.refracting;
     at.turning = slope.turning;
+    at.ray = slope.ray;
     at.reflectance = reflectance_at(slope, path.direction, medium_of(before), medium_of(behind));
     at.turn = 2.0 * slope.width / max(-dot(path.direction, slope.refracting), 1e-3);
     at.curved = slope.width > 0.0;
@@ -121,6 +123,7 @@ void recall(uint slot, uint line, out Path path, out Interface at) {
     path.lateral = interactions[slot].lateral_reflectance.xyz;
     path.spread = interactions[slot].spread.xyz;
     path.lens = interactions[slot].lens.xyz;
+    path.bent = 0.0;
     path.interactions = interactions[slot].interactions;
     path.crossings = interactions[slot].crossings;
     path.t_min = clearance(path.origin);
@@ -140,6 +143,7 @@ void recall(uint slot, uint line, out Path path, out Interface at) {
     at.shading = interactions[slot].shading.xyz;
     at.refracting = at.shading; // nothing goes through here
     at.turning = vec3(0.0);
+    at.ray = at.shading;
     at.reflectance = interactions[slot].lateral_reflectance.w;
     at.curved = false;
     at.instance = interactions[slot].instance;

@@ -35,7 +35,7 @@ layout(std430, binding = 13) restrict readonly buffer FrameBeforeBuffer { Frame 
 layout(std430, binding = 14) restrict readonly buffer InstancesBeforeBuffer { Instance instances_before[]; };
 layout(std430, binding = 15) restrict readonly buffer FieldsBeforeBuffer { vec4 fields_before[]; };
 layout(std430, binding = 16) restrict buffer LabelBuffer { Label labels[]; };
-layout(std430, binding = 17) restrict readonly buffer ApertureBuffer { vec2 apertures[]; };
+layout(std430, binding = 17) restrict readonly buffer ApertureBuffer { Aperture apertures[]; };
 
 #include "triangle.glsl"
 #ifdef RAY_QUERY

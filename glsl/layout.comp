@@ -19,6 +19,7 @@ layout(std430, binding = 8) buffer View3dBuffer { View3d views[]; };
 layout(std430, binding = 9) buffer InteractionBuffer { Interaction interactions[]; };
 layout(std430, binding = 10) buffer ScanlineBuffer { Scanline scanlines[]; };
 layout(std430, binding = 11) buffer LabelBuffer { Label labels[]; };
+layout(std430, binding = 12) buffer ApertureBuffer { Aperture apertures[]; };
 
 void main() {
     frames[0].kind = 0u;
@@ -33,4 +34,5 @@ void main() {
     interactions[0].path = 0u;
     scanlines[0].x = 0.0;
     labels[0].tissue = 0u;
+    apertures[0].gain = 0.0;
 }

@@ -12,6 +12,7 @@ struct Path {
     float time;         // one way, us
     vec3 spread;        // lateral variance a + 2 b x + c x^2 after rough reflections
     vec3 lens;          // lateral offset a + b x + c x^2 of what comes one deviation beside the axis
+    float bent;         // sine by which surfaces have turned a ray on a main path, towards its lateral axis
     vec2 strip;         // distance of the neighbouring scanline's path across, mm, and its growth per mm
     uint interactions; uint reflections; uint crossings;
     uint left_instance; uint left_primitive; // the triangle that it starts on; NONE: none
@@ -49,6 +50,7 @@ void begin(vec3 origin, vec3 direction, vec3 lateral, out Path path) {
     path.spread = vec3(frame.origin_jitter * frame.origin_jitter, 0.0, 0.0);
     if (frame.emission_lobe > 0.0) path.spread.z = 1.0 / (frame.emission_lobe + 2.0);
     path.lens = vec3(0.0);
+    path.bent = 0.0;
     path.strip = line_pitch();
     path.handedness = 1.0;
     path.t_min = 0.0;

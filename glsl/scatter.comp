@@ -23,7 +23,7 @@ layout(std430, binding = 8) restrict buffer CounterBuffer { Counters counters; }
 layout(std430, binding = 9) restrict readonly buffer ScanlineBuffer { Scanline scanlines[]; };
 layout(std430, binding = 10) restrict readonly buffer FieldBuffer { vec4 fields[]; };   // of the deforming one
 layout(std430, binding = 11) restrict buffer PointEchoBuffer { int point_echoes[]; };   // where there are point targets
-layout(std430, binding = 12) restrict readonly buffer ApertureBuffer { vec2 apertures[]; };
+layout(std430, binding = 12) restrict readonly buffer ApertureBuffer { Aperture apertures[]; };
 
 // True if any instance's tissue deforms. Two modules, as not every driver removes the code that a specialization
 // constant switches off, and the code for deformed tissue is the larger half.

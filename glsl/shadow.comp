@@ -28,7 +28,7 @@ layout(std430, binding = 8) restrict readonly buffer StackBuffer { uint stacks[]
 layout(std430, binding = 9) restrict readonly buffer RowBuffer { Row rows[]; };
 layout(std430, binding = 10) restrict buffer PieceBuffer { vec4 pieces[]; };
 layout(std430, binding = 11) restrict readonly buffer ScanlineBuffer { Scanline scanlines[]; };
-layout(std430, binding = 12) restrict buffer ShadeBuffer { vec2 shades[]; };
+layout(std430, binding = 12) restrict buffer ShadeBuffer { Aperture shades[]; };
 
 #include "triangle.glsl"
 #ifdef RAY_QUERY
@@ -111,6 +111,8 @@ void main() {
     for (uint node = 0u; node <= APERTURE_BANDS; ++node) {
         float kappa = float(node) * float(frame.samples) / float(APERTURE_BANDS);
         while (pieces[piece + 1u].x <= kappa) piece += 1u;
-        shades[aperture_at(line, node)].y = shade_lost(pieces[piece], kappa);
+        uint at = aperture_at(line, node);
+        shades[at].lost = shade_lost(pieces[piece], kappa);
+        shades[at].bent = 0.0;
     }
 }

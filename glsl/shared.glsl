@@ -62,6 +62,10 @@ const float LEAST_PITCH = 1e-6;     // mm: smallest distance between scanlines, 
 const uint APERTURE_BANDS = 48u;    // bands of equal depth in which the losses of main paths are compared
 const uint APERTURE_RAYS = 16u;     // rays from the aperture to a target
 const float APERTURE_ALIKE = 2e-3;  // nepers: scanlines lose alike in a band if no neighbours differ by more
+const float RAY_WIDTH = 0.25;        // deviation over which a surface turns one of them, over that of the whole wavefront
+const float BENT_ALIKE = 1e-4;      // and turn rays alike in a band if no neighbours' sines differ by more
+const float LEAST_MISSED = 2e-5;    // squared distance by which rays miss a target, over the beams' variance, that counts
+const float LEAST_LEVEL = -7.0;     // nepers: speckle is not weaker by surfaces that bend its beam
 const float APERTURE_FRONT = 3.0;   // nepers lost in a band from which on it has a surface that lets hardly anything through
 const uint MAX_SCANLINES = 4096u;
 const float APERTURE_JUMP = 0.5;    // nepers lost in a band from which on the loss says how far into it a place lies
@@ -186,7 +190,7 @@ struct Row {
     float variances;                              // mm^2: of the transmitted beam across and of the received one, their sum
     float defocus; float transmit_sine;           // mm: how far from the axis what the transmit focus collects from one deviation
                                                   // of the aperture is here, below 0 behind the focus; its decrease per mm
-    float unused0;
+    float receive_sine;                           // of the angle under which one deviation of the receive aperture converges on this depth
 };
 
 // A straight part of a path inside one medium.
@@ -201,6 +205,14 @@ struct Segment {
     uint line;             // with REFLECTED
     float strip;           // distance, mm, between the paths of neighbouring scanlines at the origin; its sign is the
                            // handedness: e_e = sign(strip) * cross(d, e_l)
+};
+
+// What lies on the way to a scanline's target at a node of depth.
+struct Aperture {
+    float gain;    // nepers: factor on amplitudes, as the apertures converge on the target from beside the main path, too
+    float lost;    // nepers that the main path has lost
+    float bent;    // sine by which surfaces have turned a ray on the main path, towards the lateral axis
+    float level;   // nepers: factor on the amplitude of speckle, as rays of the apertures miss the target
 };
 
 // The state of a main path on arrival at a surface, before any random choice.

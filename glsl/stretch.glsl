@@ -128,8 +128,9 @@ float spoiled(Stretch s, float x, uint row) {
     return inversesqrt(1.0 + clamp(more / rows[row].variances, 0.0, MOST_WIDENED));
 }
 
-// The same on the amplitude of a scatterer.
+// The same on the amplitude of a scatterer; on the main path surfaces bend by the aperture.
 float scattered(Stretch s, float x, uint row) {
+    if (loses_by_aperture() && !s.reflected) return exp(aperture_level(s.line, s.time + x / s.speed));
     if (all(equal(s.lens, vec3(0.0)))) return 1.0;
     return sqrt(spoiled(s, x, row));
 }

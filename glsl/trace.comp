@@ -41,7 +41,7 @@ layout(std430, binding = 16) restrict buffer InteractionBuffer { Interaction int
 layout(std430, binding = 17) restrict buffer InteractionCountBuffer { uint interaction_count[]; };
 layout(std430, binding = 18) restrict readonly buffer ScanlineBuffer { Scanline scanlines[]; };
 
-layout(std430, binding = 19) restrict buffer ApertureBuffer { vec2 apertures[]; };
+layout(std430, binding = 19) restrict buffer ApertureBuffer { Aperture apertures[]; };
 
 // The role of the paths. Copied to a variable, as naga knows no operations on specialization constants.
 layout(constant_id = 0) const uint ROLE = ROLE_WHOLE;
@@ -181,6 +181,7 @@ void transmit(inout Path path, inout Interface at, vec3 n) {
     }
     // If the middle of the beam is totally reflected but the rest is not, the path goes straight on.
     float c1 = tissues[at.before].speed, c2 = tissues[at.behind].speed;
+    if (goes_on_in_shadow()) path.bent += ray_bending(path.direction, path.lateral, at.ray, c1, c2);
     path.lens.z += rows[row_of(path.time)].aperture * bending(path.direction, path.lateral, n, at.turning, c1, c2);
     vec3 direction = path.direction, lateral = path.lateral;
     bool through = transmit_path(path, n, at.geometric, c1, c2) || at.curved;

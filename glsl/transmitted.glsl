@@ -15,7 +15,7 @@ void end_ways();
 
 // Transmits the path at a surface; returns the part of its intensity that gets through.
 float pass(inout Path path, Met here, Medium t1, Medium t2) {
-    Slope slope = slope_at(here, path, sample_at(frame.speed * path.time / frame.sample_pitch), path.spread.x);
+    Slope slope = slope_at(here, path, sample_at(frame.speed * path.time / frame.sample_pitch), path.spread.x, false);
     float transmitted = 1.0 - reflectance_at(slope, path.direction, t1, t2);
     Path before = path;
     bool through = transmit_path(path, slope.refracting, slope.geometric, t1.speed, t2.speed) || slope.width > 0.0;

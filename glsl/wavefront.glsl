@@ -11,6 +11,7 @@ struct Slope {
     vec3 shading;       // interpolated from the vertices
     vec3 refracting;    // of the mean slope over the wavefront; in geometric acoustics that of `shading`
     vec3 turning;       // change of `refracting` per mm across the path, in the image plane; 0 in geometric acoustics
+    vec3 ray;           // of the mean slope over what one of the aperture's rays stands for, where it is asked for
     float width;        // deviation of the sine of incidence over the beam
 };
 
@@ -38,8 +39,8 @@ vec3 partly_turned(vec3 n, float coherence, vec3 d) {
     return normalize(met * across - whole * whole * d);
 }
 
-// `row` is that of the path's time; `spread` the variance that the path has across, mm^2.
-Slope slope_at(Met here, Path path, uint row, float spread) {
+// `row` is that of the path's time; `spread` the variance that the path has across, mm^2. `rays`: also for a ray alone.
+Slope slope_at(Met here, Path path, uint row, float spread, bool rays) {
     Hit hit = here.hit;
     Slope slope;
     slope.geometric = here.normal;
@@ -60,19 +61,24 @@ Slope slope_at(Met here, Path path, uint row, float spread) {
         n[i] = vec4(own[i], 1.0);
     }
     slope.refracting = slope.shading;
+    slope.ray = slope.shading;
     bool wide = (frame.flags & FLAG_WAVEFRONT) != 0u;
     float coherence = 1.0;
     if (wide) {
+        float finest = instances[hit.instance].finest;
         float sigma = rows[row].sigma_wavefront;
-        float x = sqrt(sigma * sigma + spread) / instances[hit.instance].finest;
-        // What the wavefront covers of the surface is longer the more it is inclined, which the first turn tells.
-        float inclined = 1.0;
-        [[dont_unroll]] for (uint i = 0u; i < 2u; ++i) {
-            average(n, own, averages, x / inclined);
+        float x = sqrt(sigma * sigma + spread) / finest;
+        // What the wavefront covers of the surface is longer the more it is inclined, which the first turn tells. A turn
+        // before them is for a ray.
+        float inclined = mix(1.0, max(-dot(path.direction, slope.shading), LEAST_FACING), rays);
+        [[dont_unroll]] for (uint i = rays ? 0u : 1u; i < 3u; ++i) {
+            average(n, own, averages, mix(x, max(rows[row].sigma_lateral, RAY_WIDTH * sigma) / finest, i == 0u) / inclined);
             vec4 mean = (1.0 - hit.u - hit.v) * n[0] + hit.u * n[1] + hit.v * n[2];
+            vec3 normal = side * surface_to_world(hit.instance, mean.xyz);
             coherence = mean.w;
-            slope.refracting = side * surface_to_world(hit.instance, mean.xyz);
-            inclined = max(-dot(path.direction, slope.refracting), LEAST_FACING);
+            if (i == 0u) slope.ray = partly_turned(normal, coherence, path.direction);
+            slope.refracting = normal;
+            inclined = mix(max(-dot(path.direction, normal), LEAST_FACING), 1.0, i == 0u);
         }
         // Rounding alone makes less than 1 of coherences that are 1 at all corners.
         vec3 turned = partly_turned(slope.refracting, coherence, path.direction);
@@ -134,6 +140,13 @@ vec2 strip_behind(vec2 strip, vec3 direction, vec3 lateral, vec3 beside, vec3 n,
     bool through = dot(direction, n) < 0.0 && refraction(direction, n, c1, c2, middle)
         && refraction(normalize(direction + part * strip.y * lateral), normalize(n + part * strip.x * turning), c1, c2, aside);
     return vec2(strip.x * across, mix(strip.y, dot(aside - middle, beside) / part, through));
+}
+
+// Sine by which a surface of normal n turns a ray towards the path's lateral axis; 0 at total reflection.
+float ray_bending(vec3 direction, vec3 lateral, vec3 n, float c1, float c2) {
+    vec3 behind;
+    bool through = dot(direction, n) < 0.0 && refraction(direction, n, c1, c2, behind);
+    return mix(0.0, dot(behind, lateral), through);
 }
 
 // Curvature that a surface of normal n, which turns by `turning` per mm across, gives to the wavefront of a path: change

@@ -4,8 +4,8 @@
 use std::mem::size_of;
 
 use insonify::sim::layout::{
-    CONSTANTS, Counters, Frame, Fusion, Instance, Interaction, Label, Row, Scanline, Segment,
-    Surface, Tissue, View3d,
+    Aperture, CONSTANTS, Counters, Frame, Fusion, Instance, Interaction, Label, Row, Scanline,
+    Segment, Surface, Tissue, View3d,
 };
 use insonify::sim::shaders::{Library, words_of};
 use spirq::ReflectConfig;
@@ -25,7 +25,7 @@ macro_rules! mirrors {
     };
 }
 
-fn mirrors() -> [Mirror; 12] {
+fn mirrors() -> [Mirror; 13] {
     mirrors!(
         Frame,
         Tissue,
@@ -38,7 +38,8 @@ fn mirrors() -> [Mirror; 12] {
         View3d,
         Interaction,
         Scanline,
-        Label
+        Label,
+        Aperture
     )
 }
 

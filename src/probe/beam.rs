@@ -50,6 +50,11 @@ impl Probe {
         sine(self.f_number_transmit)
     }
 
+    /// Sine of the angle between the axis and what comes to depth `z` from one deviation beside it on the receive aperture.
+    pub fn receive_sine(&self, z: f64) -> f64 {
+        sine(self.f_number(z))
+    }
+
     /// Sigma across the wavefront at depth `z` that converges on what the image shows two thirds of the way
     /// to its bottom, mm: over this width a surface at `z` refracts. As wide as the receive aperture near the face, as narrow
     /// as a focus at the bottom. A Gaussian aperture whose focus is as wide as that of [`Self::sigma_lateral`].

@@ -175,6 +175,14 @@ constants! {
     pub const APERTURE_RAYS: u32 = 16;
     /// Scanlines lose alike in a band if no neighbours differ by more nepers.
     pub const APERTURE_ALIKE: f32 = 2e-3;
+    /// Deviation over which a surface turns a ray from the aperture, over that of the whole wavefront.
+    pub const RAY_WIDTH: f32 = 0.25;
+    /// Scanlines turn rays alike in a band if no neighbours' sines differ by more.
+    pub const BENT_ALIKE: f32 = 1e-4;
+    /// Squared distance by which rays miss a target, over the beams' variance, from which on it counts.
+    pub const LEAST_MISSED: f32 = 2e-5;
+    /// Nepers: speckle is not weaker by surfaces that bend its beam.
+    pub const LEAST_LEVEL: f32 = -7.0;
     /// Nepers lost in a band from which on it has a surface that lets hardly anything through.
     pub const APERTURE_FRONT: f32 = 3.0;
     /// Most scanlines of a frame.
@@ -272,7 +280,7 @@ shared! {
         tgc: f32, compensation: f32, incoherent_gain: f32, receive_reach: f32,
         black: f32, sigma_wavefront: f32, aperture: f32, strip_lines: f32,
         strip_core: f32, lobe: f32, transmit_half: f32, receive_half: f32,
-        variances: f32, defocus: f32, transmit_sine: f32, unused0: f32,
+        variances: f32, defocus: f32, transmit_sine: f32, receive_sine: f32,
     }
     /// A straight part of a path inside one medium.
     struct Segment {
@@ -283,6 +291,8 @@ shared! {
         lens: [f32; 4],
         tissue: u32, instance: u32, line: u32, strip: f32,
     }
+    /// What lies on the way to a scanline's target at a node of depth.
+    struct Aperture { gain: f32, lost: f32, bent: f32, level: f32 }
     /// The state of a main path on arrival at a surface, before any random choice.
     struct Interaction {
         origin_weight: [f32; 4],

@@ -46,11 +46,19 @@ fn aperture_reach(scene: &Scene, tables: &Tables) -> u32 {
     if !scene.simulation.loses_by_aperture() {
         return 0;
     }
-    let halves = tables.rows.iter().flat_map(|row| [row.transmit_half, row.receive_half]);
-    let pitch = scene.probe.line_pitch(0.0);
-    // Rays converge, so that they are farthest from the scanline at the face; there the lines of a phased array meet.
-    let lines = (f64::from(halves.fold(0.0, f32::max)) / pitch).ceil();
-    lines.min(f64::from(scene.probe.scanlines)) as u32
+    let probe = &scene.probe;
+    let reached = tables.rows.iter().enumerate().skip(1).map(|(k, row)| {
+        let depth = k as f64 * probe.sample_pitch();
+        let widest = f64::from(row.transmit_half.max(row.receive_half));
+        // Rays that converge on the target are farthest from the scanline at the face; there the lines of a phased array meet.
+        // Those that converge on the transmit focus are so at the face or at the target.
+        let deviations = widest / (f64::from(row.receive_sine) * depth);
+        let defocus = f64::from(row.defocus);
+        let sent = deviations * (defocus + f64::from(row.transmit_sine) * depth).abs();
+        let behind = deviations * defocus.abs() / probe.line_pitch(depth);
+        (widest.max(sent) / probe.line_pitch(0.0)).max(behind)
+    });
+    reached.fold(0.0, f64::max).ceil().min(f64::from(probe.scanlines)) as u32
 }
 
 /// Scanlines on each side over which `beam` smooths, at most, with these tables.

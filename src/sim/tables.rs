@@ -245,7 +245,7 @@ pub fn rows(scene: &Scene) -> Vec<layout::Row> {
                 variances: scene.probe.beam_variances(z) as f32,
                 defocus: (scene.probe.transmit_sine() * (scene.probe.focus - z)) as f32,
                 transmit_sine: scene.probe.transmit_sine() as f32,
-                ..layout::Row::default()
+                receive_sine: scene.probe.receive_sine(z) as f32,
             }
         })
         .collect()

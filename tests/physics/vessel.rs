@@ -17,9 +17,12 @@ pub fn speckle_behind_a_round_vessel_is_as_bright_as_waves_make_it() -> Check {
     Check {
         row: "T38",
         name: "speckle_behind_a_round_vessel_is_as_bright_as_waves_make_it",
-        claim: "A vessel of another speed of sound spoils the focus of what lies behind it. Behind its middle half the \
-            level is that of the angular spectrum within 1 dB, at four depths in front of and behind the transmit \
-            focus, for two radii, slower and faster. Chance makes 0.3 dB.",
+        claim: "A vessel of another speed of sound spoils the focus of what lies behind it, most behind its edges, \
+            where one half of the aperture looks past it. At four depths in front of and behind the transmit focus, \
+            for two radii, slower and faster, the level is that of the angular spectrum, within 1 dB behind the \
+            middle half and, of the slower ones, within 1.5 dB in the shadows, from 0.78 of the radius to its edge. \
+            (The edge of a faster one reflects all of what grazes it, which thin screens do not.) Chance makes 0.3 \
+            and 0.5 dB.",
         planted: "A vessel that absorbs half a dB per cm and MHz more.",
         run: levels,
     }
@@ -34,7 +37,7 @@ fn table() -> Value {
 
 /// Speckle without the vessel, at the settings of the table.
 fn free(table: &Value, seed: u32) -> Scene {
-    let mut scene = homogeneous(64, 0.3, seed);
+    let mut scene = homogeneous(96, 0.3, seed);
     let of = |name: &str| number(&table[name]);
     scene.tissues[0] = tissue(of("speed"), IMPEDANCE, 0.0);
     let probe = &mut scene.probe;
@@ -44,10 +47,10 @@ fn free(table: &Value, seed: u32) -> Scene {
     scene
 }
 
-/// Mean power within `half` mm of the middle, and 2 mm of a depth.
-fn power(frame: &Frame, scene: &Scene, half: f64, depth: f64) -> f64 {
+/// Mean power on both sides at a distance from the middle, mm, and within 2 mm of a depth.
+fn power(frame: &Frame, scene: &Scene, [inner, outer]: [f64; 2], depth: f64) -> f64 {
     let [from, to] = [-2.0, 2.0].map(|z| ((depth + z) / scene.probe.sample_pitch()) as usize);
-    let near = |l: &u32| scene.probe.ray(*l, 0).0.x.abs() < half;
+    let near = |l: &u32| (inner..outer).contains(&scene.probe.ray(*l, 0).0.x.abs());
     let lines = (0..scene.probe.scanlines).filter(near).map(|l| &frame.iq[l as usize][from..to]);
     mean(&lines.flatten().map(|v| v[0] * v[0] + v[1] * v[1]).collect::<Vec<_>>())
 }
@@ -76,17 +79,26 @@ fn levels(bench: &Bench, physics: Physics) -> Outcome {
         let lines: Vec<Vec<f64>> =
             case["decibels"].as_array().expect("lines").iter().map(list).collect();
         let mut points = Vec::new();
-        for (i, depth) in depths.iter().enumerate() {
-            let half = radius / 2.0;
-            let inside = places.iter().zip(&lines).filter(|(place, _)| **place < half);
+        let slower = speed < number(&table["speed"]);
+        let parts = [("middle", [0.0, 0.5], 1.0), ("edge", [0.78, 1.01], 1.5)];
+        let parts = &parts[..if slower { 2 } else { 1 }];
+        for ((part, within, allowed), (i, depth)) in
+            parts.iter().flat_map(|part| depths.iter().enumerate().map(move |depth| (part, depth)))
+        {
+            let within = within.map(|part| part * radius);
+            let inside = places.iter().zip(&lines);
+            let inside = inside.filter(|(place, _)| (within[0]..within[1]).contains(place));
             let expected = mean(&inside.map(|(_, levels)| levels[i]).collect::<Vec<_>>());
             let of = |all: &[(Frame, Scene)]| {
-                mean(&all.iter().map(|(f, s)| power(f, s, half, *depth)).collect::<Vec<_>>())
+                mean(&all.iter().map(|(f, s)| power(f, s, within, *depth)).collect::<Vec<_>>())
             };
             let found = decibel(of(&behind)) - decibel(of(&whole));
-            let what = format!("{name}: {} mm/us, {radius} mm, at {depth} mm, dB", case["speed"]);
-            out.compare(what, found, expected, 1.0);
-            points.push([*depth, found]);
+            let vessel = format!("{} mm/us, {radius} mm", case["speed"]);
+            let what = format!("{name}: {vessel}, {part}, at {depth} mm, dB");
+            out.compare(what, found, expected, *allowed);
+            if *part == "middle" {
+                points.push([*depth, found]);
+            }
         }
         let waves = depths.iter().enumerate().map(|(i, depth)| [*depth, lines[0][i]]).collect();
         let what = format!("{} mm/us, {radius} mm", case["speed"]);

@@ -5,7 +5,7 @@ use super::shadow::unpack;
 use super::{Case, Check, Input, Job, Size, Subject};
 use super::{aperture, trace};
 use crate::reference::darken;
-use insonify::sim::layout::{FAR_PIECE, FLAG_APERTURE, Frame, MAX_PIECES};
+use insonify::sim::layout::{Aperture, FAR_PIECE, FLAG_APERTURE, Frame, MAX_PIECES};
 use insonify::sim::stages;
 
 pub const SUBJECT: Subject = Subject {
@@ -66,7 +66,7 @@ fn job(case: Case, size: Size) -> Job {
         Input::words("frame", &[frame]),
         Input::floats("pieces", pieces.as_flattened()),
         Input::floats("prescan", &prescan),
-        Input { name: "shades", ..trace::apertures(&frame, &aperture::losses(&frame)) },
+        Input { name: "shades", ..trace::apertures(&frame, &aperture::passed(&frame)) },
     ];
     Job::of(&stages::DARKEN, given, Vec::new())
 }
@@ -75,7 +75,7 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     let frame: Frame = job.one("frame");
     let lines = unpack(&job.get::<[f32; 4]>("pieces"));
     let prescan: Vec<[f32; 2]> = job.get("prescan");
-    let shades: Vec<[f32; 2]> = job.get("shades");
+    let shades: Vec<Aperture> = job.get("shades");
     let got: Vec<f32> = job.after(outputs, "shaded");
     let mut expected = Vec::new();
     for l in 0..frame.scanlines {

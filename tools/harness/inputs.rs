@@ -156,10 +156,10 @@ pub fn rows(frame: &Frame) -> Vec<Row> {
                 lobe: 10.0 + 0.2 * depth,
                 transmit_half: (0.21 * depth).min(7.13),
                 receive_half: 0.173 * depth,
-                variances: 2.5 * sigmas[0] * sigmas[0],
+                variances: 2.5 * sigmas[0] * sigmas[0] + (2.0 - 0.08 * depth).powi(2),
                 defocus: 2.0 - 0.08 * depth,
                 transmit_sine: 0.08,
-                ..Row::default()
+                receive_sine: 0.09,
             }
         })
         .collect()

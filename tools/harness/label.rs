@@ -86,7 +86,7 @@ fn job(case: Case, size: Size) -> Job {
         Input::words("instances_before", &instances),
         Input::floats("fields_before", &values),
     ]);
-    inputs.push(trace::apertures(&frame, &aperture::losses(&frame)));
+    inputs.push(trace::apertures(&frame, &aperture::passed(&frame)));
     Job::of(&stages::LABEL, inputs, Vec::new())
 }
 

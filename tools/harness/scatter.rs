@@ -3,8 +3,9 @@
 use super::check::relative_norm;
 use super::inputs::{Random, lines, rows, scanlines};
 use super::{Case, Check, Extent, Input, Job, Size, Subject, trace, worlds};
+use crate::reference::aperture::Passed;
 use crate::reference::{Segment, origin, scatter};
-use insonify::sim::layout::{self, Counters, FLAG_VOXEL, Frame};
+use insonify::sim::layout::{self, Aperture, Counters, FLAG_VOXEL, Frame};
 use insonify::sim::stages;
 use insonify::sim::tables::with_spheres;
 
@@ -39,7 +40,7 @@ pub(super) fn segments(job: &Job, frame: &Frame) -> (Vec<layout::Segment>, Vec<u
     let mut owned = worlds::owned(job);
     let nodes = trace::nodes(frame);
     // Branches as if apertures changed nothing.
-    owned.apertures = vec![[0.0; 2]; nodes];
+    owned.apertures = vec![Aperture::default(); nodes];
     let mut world = owned.world();
     let rows = rows(frame);
     world.rows = &rows;
@@ -54,8 +55,9 @@ pub(super) fn segments(job: &Job, frame: &Frame) -> (Vec<layout::Segment>, Vec<u
         }
         counts.push(found.len().min(capacity) as u32);
     }
-    let lost = if traced.lost.is_empty() { vec![0.0; nodes] } else { traced.lost };
-    (slots, counts, trace::apertures(frame, &lost))
+    let none = vec![Passed::default(); nodes];
+    let passed = if traced.passed.is_empty() { none } else { traced.passed };
+    (slots, counts, trace::apertures(frame, &passed))
 }
 
 fn job(case: Case, size: Size) -> Job {

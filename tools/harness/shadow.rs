@@ -8,8 +8,8 @@ use crate::reference::darken;
 use crate::reference::origin;
 use crate::reference::shadow::{self, Piece};
 use insonify::sim::layout::{
-    APERTURE_BANDS, FAR_PIECE, FLAG_APERTURE, FLAG_COINCIDENT, FLAG_FOOTPRINT, FLAG_MASKED,
-    FLAG_WAVEFRONT, MAX_PIECES, START_WORDS, Surface,
+    APERTURE_BANDS, Aperture, FAR_PIECE, FLAG_APERTURE, FLAG_COINCIDENT, FLAG_FOOTPRINT,
+    FLAG_MASKED, FLAG_WAVEFRONT, MAX_PIECES, START_WORDS, Surface,
 };
 use insonify::sim::stages;
 
@@ -109,13 +109,13 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     let wrong = got.iter().zip(&twin).filter(|(got, twin)| !alike(got, twin));
     let wrong = wrong.count();
     // What is lost at the nodes is what the pieces say.
-    let shades: Vec<[f32; 2]> = job.after(outputs, "shades");
+    let shades: Vec<Aperture> = job.after(outputs, "shades");
     let lines = frame.layers * frame.scanlines;
     let nodes = (0..lines).flat_map(|line| (0..=APERTURE_BANDS).map(move |node| [line, node]));
     let otherwise = |&[line, node]: &[u32; 2]| {
         let kappa = f64::from(node) * f64::from(frame.samples) / f64::from(APERTURE_BANDS);
         let expected = darken::lost(shadow::level(&got[line as usize], kappa));
-        let lost = f64::from(shades[aperture::place(&frame, line, node)][1]);
+        let lost = f64::from(shades[aperture::place(&frame, line, node)].lost);
         (lost - expected).abs() >= 1e-4 || lost.is_nan() != expected.is_nan()
     };
     let lost = nodes.filter(|at| loses_by_aperture(&frame) && otherwise(at)).count();

@@ -4,9 +4,10 @@ use super::check::relative_norm;
 use super::inputs::{Random, frame, lines, rows, scanlines};
 use super::worlds;
 use super::{Case, Check, Extent, Input, Job, Size, Subject};
+use crate::reference::aperture::Passed;
 use crate::reference::{Segment, origin, trace};
 use insonify::sim::layout::{
-    self, APERTURE_BANDS, Counters, FLAG_APERTURE, FLAG_COHERENT, FLAG_COINCIDENT,
+    self, APERTURE_BANDS, Aperture, Counters, FLAG_APERTURE, FLAG_COHERENT, FLAG_COINCIDENT,
     FLAG_FACE_REFLECTION, FLAG_FOOTPRINT, FLAG_MASKED, FLAG_ROUGH_TRANSMISSION, FLAG_SOBOL,
     FLAG_WAVEFRONT, FLAG_WORLD_TEXTURE, Frame, SAMPLING_MAIN_PATH, SAMPLING_PLAIN,
     SAMPLING_SHARED_PRIMARY, START_WORDS,
@@ -107,11 +108,22 @@ pub(super) fn nodes(frame: &Frame) -> usize {
     lines(frame) * (APERTURE_BANDS as usize + 1)
 }
 
-/// Factors by the aperture, of any size, beside these losses.
-pub(super) fn apertures(frame: &Frame, lost: &[f64]) -> Input {
+/// Factors by the aperture, of any size, beside what main paths have passed.
+pub(super) fn apertures(frame: &Frame, passed: &[Passed]) -> Input {
     let gains = Random(17).floats(nodes(frame), -0.7, 0.7);
-    let table: Vec<[f32; 2]> = gains.iter().zip(lost).map(|(g, lost)| [*g, *lost as f32]).collect();
-    Input::floats("apertures", table.as_flattened())
+    let levels = Random(19).floats(nodes(frame), -0.7, 0.0);
+    let table: Vec<Aperture> = gains
+        .iter()
+        .zip(&levels)
+        .zip(passed)
+        .map(|((&gain, &level), passed)| Aperture {
+            gain,
+            lost: passed.lost as f32,
+            bent: passed.bent as f32,
+            level,
+        })
+        .collect();
+    Input::floats("apertures", bytemuck::cast_slice(&table))
 }
 
 fn job(case: Case, size: Size) -> Job {
@@ -129,7 +141,7 @@ fn job(case: Case, size: Size) -> Job {
         Input::words("stacks", &origin::pack(&stacks)),
         Input::floats("rows", bytemuck::cast_slice(&rows)),
         scanlines(&frame),
-        apertures(&frame, &vec![0.0; nodes(&frame)]),
+        apertures(&frame, &vec![Passed::default(); nodes(&frame)]),
     ]);
     let push = bytemuck::bytes_of(&[0, frame.paths]).to_vec();
     Job::of(&stages::TRACE[0], job.inputs, push)
@@ -161,17 +173,20 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     let paths = lines(frame) * frame.paths as usize;
     let spare = 4 * (paths / 400);
     let interactions = counters.interactions.abs_diff(twin.counters.interactions) as usize;
-    let table: Vec<[f32; 2]> = job.after(outputs, "apertures");
-    let otherwise = |(node, lost): &(&[f32; 2], &f64)| {
-        let error = (f64::from(node[1]) - **lost).abs();
-        // NaN, too, is an error.
-        error.is_nan() || error >= 1e-3 + 1e-3 * lost.abs()
-    };
-    let lost_otherwise = table.iter().zip(&twin.lost).filter(otherwise).count();
+    let table: Vec<Aperture> = job.after(outputs, "apertures");
+    // NaN, too, is an error.
+    let close = |got: f32, expected: f64, allowed: f64| (f64::from(got) - expected).abs() < allowed;
+    let nodes = || table.iter().zip(&twin.passed);
+    let lost_otherwise = nodes()
+        .filter(|(got, passed)| !close(got.lost, passed.lost, 1e-3 + 1e-3 * passed.lost.abs()))
+        .count();
+    let bent_otherwise =
+        nodes().filter(|(got, passed)| !close(got.bent, passed.bent, BENT)).count();
     let kept = |c: &Counters| [c.paths_lost, c.stack_overflow, c.segments_dropped];
     let limited = counters.strips_limited.abs_diff(twin.counters.strips_limited) as usize;
     vec![
-        Check::count("losses", twin.lost.len(), lost_otherwise, twin.lost.len() / 100),
+        Check::count("losses", twin.passed.len(), lost_otherwise, twin.passed.len() / 100),
+        Check::count("bent rays", twin.passed.len(), bent_otherwise, twin.passed.len() / 100),
         Check::count("strips limited", total, limited, spare),
         Check::count("segments", total, missing, spare),
         Check::one("echo norm", relative_norm(&echoes, &fixed), 2e-3),
@@ -195,6 +210,9 @@ fn unmatched(mut got: Vec<Segment>, expected: &[Segment]) -> usize {
 /// Absolute error of a lens in single precision: of a direction, some 1e-7, over the step with which it is found; mm after
 /// 100 mm, its change per mm, and half of the change of that.
 const LENS: [f64; 3] = [1e-2, 2e-4, 1e-6];
+
+/// Absolute error of the sine by which rays are bent: of a normal that is averaged, packed in 13 bits an axis.
+const BENT: f64 = 1e-3;
 
 /// Absolute error of a strip, mm and mm per mm, for the same reason.
 const STRIP: [f64; 2] = [1e-3, 2e-5];

@@ -1,8 +1,8 @@
 //! Twin of `darken`: the acquired volume along the scanlines behind the simulated anatomy.
 
-use super::aperture::{loses_by_aperture, lost_of, nepers};
+use super::aperture::{counted, loses_by_aperture, lost_of, nepers};
 use super::shadow::{Piece, level};
-use insonify::sim::layout::Frame;
+use insonify::sim::layout::{Aperture, Frame};
 
 /// Nepers lost at a level, limited as on main paths.
 pub fn lost(level: f64) -> f64 {
@@ -14,7 +14,7 @@ pub fn lost(level: f64) -> f64 {
 pub fn transmitted(
     frame: &Frame,
     lines: &[Vec<Piece>],
-    shades: &[[f32; 2]],
+    shades: &[Aperture],
     l: u32,
     k: u32,
 ) -> f64 {
@@ -26,7 +26,7 @@ pub fn transmitted(
         }
         let lost = lost(level);
         let time = f64::from(k) * f64::from(frame.sample_pitch) / f64::from(frame.speed);
-        (nepers(frame, |at| shades[at].map(f64::from), line, time, lost) - lost).exp()
+        (nepers(frame, counted(shades), line, time, lost) - lost).exp()
     });
     amplitudes.sum::<f64>() / f64::from(frame.layers)
 }

@@ -35,7 +35,7 @@ pub fn expect(world: &World, segments: &[Segment], speckle: &[f32]) -> Vec<[f64;
             if frame.flags & FLAG_VOXEL == 0 {
                 // Fainter by as much as the beam would be wider; a sample is as much longer as sound is faster.
                 power *= f64::from(tissue.speed) / f64::from(frame.speed);
-                power *= tube.spoiled(x, row);
+                power *= tube.scattered(x, row).powi(2);
             }
             let at = (scanline * frame.samples + k) as usize;
             let unit = f64::from(speckle[(k * frame.layers + layer) as usize]);

@@ -41,6 +41,7 @@ pub(super) struct Interface {
     pub(super) refracting: DVec3,
     /// Change of `refracting` per mm across the path, in the image plane; 0 in geometric acoustics.
     turning: DVec3,
+    ray: DVec3,
     /// The micro-normal; none if no attempt was acceptable: then there is no echo and no reflected path.
     pub(super) micro: Option<Micro>,
     /// Fluids before and behind.
@@ -72,7 +73,7 @@ pub(super) fn meet(
     after: &Stack,
 ) -> Interface {
     let d = path.direction;
-    let Slope { geometric, shading, refracting, turning, width } = world.slope(row, path, hit);
+    let Slope { geometric, shading, refracting, turning, ray, width } = world.slope(row, path, hit);
     let tissue = |stack| &world.tissues[world.medium(stack).0 as usize];
     let (before, behind) = (tissue(&path.stack), tissue(after));
     let fluids = [fluid(before), fluid(behind)];
@@ -86,6 +87,7 @@ pub(super) fn meet(
         shading,
         refracting,
         turning,
+        ray,
         micro: micro_normal(world, path, geometric, shading, roughness),
         fluids,
         reflectance: footprint::reflectance(fluids[0], fluids[1], cos_i.max(0.0), width),
@@ -154,6 +156,14 @@ impl Interface {
         let beside = through((n + step * self.turning).normalize());
         let bent = beside.zip(through(n)).map(|(beside, middle)| (beside - middle) / step);
         bent.map_or(0.0, |bent| bent.dot(path.lateral))
+    }
+
+    /// Sine by which a ray on `path` is turned towards its lateral axis; 0 at total reflection.
+    pub(super) fn ray_bending(&self, path: &Path) -> f64 {
+        let [before, behind] = self.fluids;
+        let through = refract(before, behind, path.direction, self.ray);
+        let through = through.filter(|_| path.direction.dot(self.ray) < 0.0);
+        through.map_or(0.0, |direction| direction.dot(path.lateral))
     }
 
     /// The neighbouring scanline's path behind the surface, refracted at normal `n`, where the path's lateral axis is

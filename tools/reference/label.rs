@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::aperture::{loses_by_aperture, nepers};
+use super::aperture::{counted, loses_by_aperture, nepers};
 use super::beam::coupling;
 use super::field::Field;
 use super::geometry::world_line;
@@ -84,12 +84,12 @@ impl Labels {
         let place = way.path.origin + x * way.path.direction;
         let mut lost = way.absorption * x - way.path.weight.ln();
         if loses_by_aperture(frame) {
-            let table = |at: usize| world.apertures[at].map(f64::from);
+            let table = counted(world.apertures);
             let time = k * f64::from(frame.sample_pitch) / f64::from(frame.speed);
             // The layers beside the middle of the slice.
             let beside = [(frame.layers - 1) / 2, frame.layers / 2].map(|layer| {
                 let line = layer * frame.scanlines + way.path.line;
-                nepers(frame, table, line, time, lost)
+                nepers(frame, &table, line, time, lost)
             });
             lost -= (beside[0] + beside[1]) / 2.0;
             if lost > -f64::from(frame.min_weight).ln() {

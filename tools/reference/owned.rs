@@ -4,7 +4,7 @@ use super::world::{Geometry, World, affine};
 use super::{aperture, origin, trace};
 use insonify::scene::Mesh;
 use insonify::scene::smoothed::{FINEST, smoothed};
-use insonify::sim::layout::{Frame, Instance, Row, Surface, Tissue};
+use insonify::sim::layout::{Aperture, Frame, Instance, Row, Surface, Tissue};
 
 /// The arrays that a [`World`] borrows, in the device's layout and units.
 #[derive(Clone, Debug, Default)]
@@ -31,8 +31,8 @@ pub struct Owned {
     pub triangles: Vec<[u32; 3]>,
     /// Displacement fields, in vectors.
     pub fields: Vec<[f32; 3]>,
-    /// Factors by the aperture and losses ([`World::apertures`]).
-    pub apertures: Vec<[f32; 2]>,
+    /// What lies on the way to targets ([`World::apertures`]).
+    pub apertures: Vec<Aperture>,
 }
 
 impl Owned {
@@ -85,13 +85,18 @@ impl Owned {
         }
     }
 
-    /// Computes what the main paths lose, and the factors by the aperture; nothing where losses do not count by it.
+    /// Computes what lies on the way to targets; nothing where losses do not count by the aperture.
     pub fn converge(&mut self) {
         let world = self.world();
-        let lost = trace::losses(&world, &origin::origin(&world).0);
-        let gains = aperture::aperture(&self.frame, &self.rows, &lost);
-        let nodes = gains.iter().zip(&lost);
-        self.apertures = nodes.map(|(gain, lost)| [*gain as f32, *lost as f32]).collect();
+        let passed = trace::passed(&world, &origin::origin(&world).0);
+        let found = aperture::aperture(&self.frame, &self.rows, &passed);
+        let nodes = found.iter().zip(&passed).map(|(found, passed)| Aperture {
+            gain: found.gain as f32,
+            lost: passed.lost as f32,
+            bent: passed.bent as f32,
+            level: found.level as f32,
+        });
+        self.apertures = nodes.collect();
     }
 
     /// Segments per line and surface echoes; every line starts inside the media that enclose its origin.

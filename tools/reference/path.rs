@@ -52,6 +52,8 @@ pub(super) struct Path {
     pub(super) spread: [f64; 3],
     /// See [`super::Segment::lens`].
     pub(super) lens: [f64; 3],
+    /// Sine by which surfaces have turned a ray on a main path, towards its lateral axis.
+    pub(super) bent: f64,
     /// Distance of the neighbouring scanline's path across, mm, and its growth per mm.
     pub(super) strip: [f64; 2],
     /// Probability with which it was followed; its weight is divided by it.

@@ -6,7 +6,7 @@ mod others;
 
 use glam::{DAffine3, DVec3};
 
-use super::aperture::{loses_by_aperture, lost_of, nepers};
+use super::aperture::{counted, level, loses_by_aperture, lost_of, nepers};
 use super::field::Field;
 use super::geometry::{beam_weight, line_pitch, probe, world_line};
 use super::world::World;
@@ -182,7 +182,7 @@ impl<'a> Tube<'a> {
         if !loses_by_aperture(frame) || segment.reflected {
             return 1.0;
         }
-        let table = |at: usize| self.world.apertures[at].map(f64::from);
+        let table = counted(self.world.apertures);
         let lost = lost_of(segment.weight) + f64::from(self.tissue.absorption) * x;
         let nepers = nepers(frame, table, segment.line, self.time(x), lost);
         if nepers - lost < f64::from(frame.min_weight).ln() { 0.0 } else { nepers.exp() }
@@ -280,7 +280,7 @@ impl<'a> Tube<'a> {
     /// the root of the sum of their variances. What comes from one deviation of the aperture misses the axis by `off` on the
     /// received beam; on the transmitted one it was `defocus` beside it and is `moved` farther. A lens that would mend the focus is
     /// too small to have all of the beam.
-    pub(super) fn spoiled(&self, x: f64, row: &Row) -> f64 {
+    fn spoiled(&self, x: f64, row: &Row) -> f64 {
         let [a, b, c] = self.segment.lens;
         let (off, turn) = (a + x * (b + x * c), b + 2.0 * x * c);
         let defocus = f64::from(row.defocus);
@@ -288,6 +288,15 @@ impl<'a> Tube<'a> {
         let moved = turn / 2.0 * defocus / aperture + off * f64::from(row.transmit_sine) / aperture;
         let more = off.powi(2) + (defocus + moved).powi(2) - defocus.powi(2);
         (1.0 + (more / f64::from(row.variances)).clamp(0.0, MOST_WIDENED.into())).sqrt().recip()
+    }
+
+    /// Factor on the amplitude of speckle at distance `x`, by surfaces that bend the beam; on the main path by the aperture.
+    pub(super) fn scattered(&self, x: f64, row: &Row) -> f64 {
+        let (frame, segment) = (self.world.frame, self.segment);
+        if loses_by_aperture(frame) && !segment.reflected {
+            return level(frame, self.world.apertures, segment.line, self.time(x)).exp();
+        }
+        self.spoiled(x, row).sqrt()
     }
 
     /// Distance of the neighbouring scanlines' paths at distance `x`, over that of the scanlines, with its limits.
@@ -348,7 +357,7 @@ impl<'a> Tube<'a> {
         let share = strip_share(row, across);
         let up = self.layer_offset + from.dot(self.elevation);
         // A wider strip has more scatterers.
-        let fainter = ratio.sqrt() / self.spoiled(x, row).sqrt();
+        let fainter = ratio.sqrt() / self.scattered(x, row);
         share * (-0.5 * up * up * falling).exp() / fainter
     }
 

@@ -2,6 +2,7 @@
 
 use glam::{DAffine3, DVec3};
 
+use super::aperture::Passed;
 use super::geometry::{face, line_pitch, world_line};
 use super::interface::{self, Interface};
 use super::path::{Path, Role, reflect, step};
@@ -18,7 +19,7 @@ use insonify::sim::layout::{
 mod branches;
 mod losses;
 
-pub use losses::losses;
+pub use losses::passed;
 
 /// The results of `trace`.
 #[derive(Clone, Debug)]
@@ -27,8 +28,8 @@ pub struct Traced {
     pub surface: Accumulator,
     /// Segments per line e * scanlines + l, by path; none is dropped for lack of room.
     pub segments: Vec<Vec<Segment>>,
-    /// Nepers that the main paths have lost, by layer, node and scanline; empty where losses do not count by the aperture.
-    pub lost: Vec<f64>,
+    /// What the main paths have passed, by layer, node and scanline; empty where losses do not count by the aperture.
+    pub passed: Vec<Passed>,
     /// Counters; `segments_dropped` is the number beyond the frame's capacity.
     pub counters: Counters,
 }
@@ -47,7 +48,7 @@ struct Tracer<'a> {
 pub fn trace(world: &World, starts: &[Start]) -> Traced {
     let frame = world.frame;
     let lines = frame.layers * frame.scanlines;
-    let mut tracer = Tracer::new(world, losses(world, starts));
+    let mut tracer = Tracer::new(world, passed(world, starts));
     for line in 0..lines {
         for n in 0..frame.paths {
             let path = tracer.start(line, n, &starts[line as usize]);
@@ -63,7 +64,7 @@ pub fn trace(world: &World, starts: &[Start]) -> Traced {
 }
 
 impl<'a> Tracer<'a> {
-    fn new(world: &'a World<'a>, lost: Vec<f64>) -> Self {
+    fn new(world: &'a World<'a>, passed: Vec<Passed>) -> Self {
         let frame = world.frame;
         Self {
             world,
@@ -73,7 +74,7 @@ impl<'a> Tracer<'a> {
             out: Traced {
                 surface: Accumulator::new(frame),
                 segments: vec![Vec::new(); (frame.layers * frame.scanlines) as usize],
-                lost,
+                passed,
                 counters: Counters::default(),
             },
         }
@@ -112,6 +113,7 @@ impl<'a> Tracer<'a> {
             reflections: 0,
             spread: [jitter * jitter, 0.0, fan],
             lens: [0.0; 3],
+            bent: 0.0,
             strip: {
                 let [pitch, growth] = line_pitch(frame);
                 [pitch + begin.travelled * growth, growth]
@@ -327,6 +329,9 @@ impl<'a> Tracer<'a> {
     fn pass(&self, path: &mut Path, interface: &Interface, normal: DVec3, after: Stack) {
         let direction = interface.turned(self.world, path, normal).unwrap_or(path.direction);
         let row = &self.world.rows[self.out.surface.sample(path.time)];
+        if self.is_steady(path) {
+            path.bent += interface.ray_bending(path);
+        }
         path.lens[2] += f64::from(row.aperture) * interface.bending(path, normal);
         let lateral = (path.lateral - path.lateral.dot(direction) * direction).normalize();
         path.strip = interface.strip_behind(path, normal, lateral);

@@ -61,6 +61,7 @@ pub(super) fn middle(frame: &Frame, line: u32, along: Line, begin: &Start) -> Pa
         reflections: 0,
         spread: [0.0; 3],
         lens: [0.0; 3],
+        bent: 0.0,
         strip: [0.0; 2], // not asked for
         survival: 1.0,
         group: [0, 1],

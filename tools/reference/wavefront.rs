@@ -6,7 +6,7 @@ use super::acoustics::{Fluid, refract};
 use super::path::Path;
 use super::world::{Crossing, World};
 use insonify::sim::layout::{
-    FLAG_FOOTPRINT, FLAG_WAVEFRONT, Frame, LEAST_DESCENT, LEAST_FACING, Row,
+    FLAG_FOOTPRINT, FLAG_WAVEFRONT, Frame, LEAST_DESCENT, LEAST_FACING, RAY_WIDTH, Row,
 };
 
 /// A surface where a path meets it. Normals are unit and turned against the path, that of the wavefront as far as
@@ -21,6 +21,8 @@ pub(super) struct Slope {
     pub(super) refracting: DVec3,
     /// Change of `refracting` per mm across the path, in the image plane; 0 in geometric acoustics.
     pub(super) turning: DVec3,
+    /// Normal of the mean slope over what one of the aperture's rays stands for, by which it turns.
+    pub(super) ray: DVec3,
     /// Deviation of sin i over the beam; 0 on flat surfaces and in geometric acoustics.
     pub(super) width: f64,
 }
@@ -76,16 +78,24 @@ impl World<'_> {
         let wide = self.frame.flags & FLAG_WAVEFRONT != 0;
         let (mut corners, mut refracting) = (self.corner_normals(hit), shading);
         let mut turning = DVec3::ZERO;
+        let mut ray = shading;
         if wide {
             let width = f64::from(row.sigma_wavefront).hypot(spread.sqrt());
-            let upright = side * self.between(hit, self.averaged(hit, width).0);
-            // What the wavefront covers of the surface is longer the more it is inclined.
-            let facing = (-d.dot(upright)).max(f64::from(LEAST_FACING));
-            let coherences;
-            (corners, coherences) = self.averaged(hit, width / facing);
-            refracting = side * self.between(hit, corners);
+            let facing = |n: DVec3| (-d.dot(n)).max(f64::from(LEAST_FACING));
             let [u, v] = hit.uv;
-            let coherence = (1.0 - u - v) * coherences[0] + u * coherences[1] + v * coherences[2];
+            let mean = |width: f64| {
+                let (corners, [a, b, c]) = self.averaged(hit, width);
+                let coherence = (1.0 - u - v) * a + u * b + v * c;
+                (corners, side * self.between(hit, corners), coherence)
+            };
+            // What a beam covers of the surface is longer the more it is inclined.
+            let narrow = f64::from(row.sigma_lateral)
+                .max(f64::from(RAY_WIDTH) * f64::from(row.sigma_wavefront));
+            let (_, narrow, coherence) = mean(narrow / facing(shading));
+            ray = partly_turned(narrow, coherence, d);
+            let (_, upright, _) = mean(width);
+            let coherence;
+            (corners, refracting, coherence) = mean(width / facing(upright));
             turning = side * coherence * self.turning(hit, corners, path.lateral);
             if coherence <= 0.99999 {
                 refracting = partly_turned(refracting, coherence, d);
@@ -100,7 +110,7 @@ impl World<'_> {
             let averaged_away = along.normalize().dot(shading - refracting);
             width = curved.hypot(averaged_away);
         }
-        Slope { geometric, shading, refracting, turning, width }
+        Slope { geometric, shading, refracting, turning, ray, width }
     }
 }
 

@@ -5,7 +5,7 @@ use glam::{DAffine3, DMat3, DVec3};
 use super::field::Field;
 use super::stack::Stack;
 use insonify::scene::triangle;
-use insonify::sim::layout::{Frame, Instance, NONE, Row, Rows, Surface, Tissue};
+use insonify::sim::layout::{Aperture, Frame, Instance, NONE, Row, Rows, Surface, Tissue};
 
 /// Distance, mm, below which crossings of one instance from one side are one crossing: a ray
 /// through an edge meets both its triangles.
@@ -57,9 +57,8 @@ pub struct World<'a> {
     pub points: &'a [[f32; 4]],
     /// Displacement fields of deforming instances.
     pub fields: &'a [[f32; 3]],
-    /// Factor by the aperture and loss of the main path, nepers, by layer, node and scanline; read where losses count by
-    /// the aperture.
-    pub apertures: &'a [[f32; 2]],
+    /// What lies on the way to targets, by layer, node and scanline; read where losses count by the aperture.
+    pub apertures: &'a [Aperture],
 }
 
 /// A ray's crossing of one mesh.

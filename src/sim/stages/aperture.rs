@@ -1,6 +1,6 @@
 //! `aperture`: what the aperture that converges on a target lets through, of what the scanline's main path alone loses.
 
-use super::super::layout::{APERTURE_BANDS, Frame};
+use super::super::layout::{APERTURE_BANDS, Aperture, Frame};
 use super::super::pass::{Array, Extent, Pass, Sizes};
 use crate::output::npy::Element::Float;
 
@@ -9,8 +9,8 @@ pub const APERTURE: Pass = Pass {
     name: "aperture",
     binds: &["frame", "rows", "scanlines", "apertures"],
     makes: &[
-        // Nepers of gain and of loss, by layer, node and scanline.
-        Array::new("apertures", Float, 2, nodes),
+        // By layer, node and scanline.
+        Array::of::<Aperture>("apertures", Float, nodes),
     ],
     extent: Some(|frame: &Frame| extent(frame, u32::MAX)),
     // Kernels that read nothing of it bind it, too.
@@ -30,7 +30,7 @@ pub fn extent(frame: &Frame, at_once: u32) -> Extent {
 }
 
 /// The losses of an acquired volume's shadows, for which the stage runs once more.
-pub(super) const SHADES: Array = Array::new("shades", Float, 2, nodes);
+pub(super) const SHADES: Array = Array::of::<Aperture>("shades", Float, nodes);
 
 /// Nodes of depth of all lines.
 fn nodes(sizes: &Sizes) -> u64 {

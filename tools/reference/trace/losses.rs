@@ -1,29 +1,32 @@
-//! Losses of the main paths on their way, and what of the beam is left where its middle is dark.
+//! What the main paths pass on their way, and what of the beam is left where its middle is dark.
 
 use insonify::sim::layout::{APERTURE_BANDS, HARDLY_PASSED, OTHER_SPEED};
 
 use super::Tracer;
-use crate::reference::aperture::{UNKNOWN, loses_by_aperture, lost_of, nepers, place, time_of};
+use crate::reference::aperture::{
+    Passed, UNKNOWN, loses_by_aperture, lost_of, nepers, place, time_of,
+};
 use crate::reference::interface::Interface;
 use crate::reference::path::{Path, Role};
 use crate::reference::straight::Start;
 use crate::reference::world::World;
 
-/// Nepers that the main paths lose, by layer, node and scanline; none where losses do not count by the aperture.
-pub fn losses(world: &World, starts: &[Start]) -> Vec<f64> {
+/// What the main paths pass, by layer, node and scanline; nothing where losses do not count by the aperture.
+pub fn passed(world: &World, starts: &[Start]) -> Vec<Passed> {
     let frame = world.frame;
     let lines = frame.layers * frame.scanlines;
     if !loses_by_aperture(frame) {
         return Vec::new();
     }
-    let mut tracer = Tracer::new(world, vec![0.0; (lines * (APERTURE_BANDS + 1)) as usize]);
+    let mut tracer =
+        Tracer::new(world, vec![Passed::default(); (lines * (APERTURE_BANDS + 1)) as usize]);
     tracer.ahead = true;
     for line in 0..lines {
         tracer.node = 0;
         let path = tracer.start(line, 0, &starts[line as usize]);
         tracer.follow(path);
     }
-    tracer.out.lost
+    tracer.out.passed
 }
 
 impl Tracer<'_> {
@@ -47,7 +50,8 @@ impl Tracer<'_> {
     pub(super) fn whole(&self, path: &Path) -> Path {
         let mut whole = path.clone();
         if self.is_steady(path) && !self.ahead {
-            let table = |at: usize| [self.world.apertures[at][0].into(), self.out.lost[at]];
+            let table =
+                |at: usize| [self.world.apertures[at].gain.into(), self.out.passed[at].lost];
             let lost = lost_of(path.weight);
             whole.weight *= nepers(self.world.frame, table, path.line, path.time, lost).exp();
         }
@@ -75,8 +79,9 @@ impl Tracer<'_> {
             let way = time_of(frame, self.node) - path.time;
             let at = place(frame, path.line, self.node);
             let followed = rate.filter(|_| way >= 0.0);
-            self.out.lost[at] = followed
+            let lost = followed
                 .map_or(UNKNOWN, |rate| (lost_of(path.weight) + rate * way).min(lost_of(0.0)));
+            self.out.passed[at] = Passed { lost, bent: path.bent };
             self.node += 1;
         }
     }
