@@ -291,7 +291,7 @@ shared! {
         lens: [f32; 4],
         tissue: u32, instance: u32, line: u32, strip: f32,
     }
-    /// What lies on the way to a scanline's target at a node of depth.
+    /// A node of depth of a scanline: factors and losses on the way to a target there.
     struct Aperture { gain: f32, lost: f32, bent: f32, level: f32 }
     /// The state of a main path on arrival at a surface, before any random choice.
     struct Interaction {

@@ -47,6 +47,7 @@ fn aperture_reach(scene: &Scene, tables: &Tables) -> u32 {
         return 0;
     }
     let probe = &scene.probe;
+    let pitch = probe.line_pitch(0.0);
     let reached = tables.rows.iter().enumerate().skip(1).map(|(k, row)| {
         let depth = k as f64 * probe.sample_pitch();
         let widest = f64::from(row.transmit_half.max(row.receive_half));
@@ -56,7 +57,7 @@ fn aperture_reach(scene: &Scene, tables: &Tables) -> u32 {
         let defocus = f64::from(row.defocus);
         let sent = deviations * (defocus + f64::from(row.transmit_sine) * depth).abs();
         let behind = deviations * defocus.abs() / probe.line_pitch(depth);
-        (widest.max(sent) / probe.line_pitch(0.0)).max(behind)
+        (widest.max(sent) / pitch).max(behind)
     });
     reached.fold(0.0, f64::max).ceil().min(f64::from(probe.scanlines)) as u32
 }

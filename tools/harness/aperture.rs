@@ -27,7 +27,7 @@ pub const SUBJECT: Subject = Subject {
 /// half a radian miss a target 60 mm away by 3e-4 mm more, and two that meet there a millimetre apart overlap by so much less.
 const LEVEL: f64 = 1e-3;
 
-/// What main paths pass: losses, little ones that all lines share, those of a few organs, and shadows of bones; and surfaces of
+/// Losses and bending of main paths: losses, little ones that all lines share, those of a few organs, and shadows of bones; and surfaces of
 /// organs that bend.
 pub(super) fn passed(frame: &Frame) -> Vec<Passed> {
     let nodes = APERTURE_BANDS + 1;
