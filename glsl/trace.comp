@@ -182,7 +182,9 @@ void transmit(inout Path path, inout Interface at, vec3 n) {
     // If the middle of the beam is totally reflected but the rest is not, the path goes straight on.
     float c1 = tissues[at.before].speed, c2 = tissues[at.behind].speed;
     if (goes_on_in_shadow()) path.bent += ray_bending(path.direction, path.lateral, at.ray, c1, c2);
-    path.lens.z += rows[row_of(path.time)].aperture * bending(path.direction, path.lateral, n, at.turning, c1, c2);
+    if ((frame.flags & FLAG_WAVEFRONT) != 0u) {
+        path.lens.z += rows[row_of(path.time)].aperture * bending(path.direction, path.lateral, n, at.turning, c1, c2);
+    }
     vec3 direction = path.direction, lateral = path.lateral;
     bool through = transmit_path(path, n, at.geometric, c1, c2) || at.curved;
     path.strip = strip_behind(path.strip, direction, lateral, path.lateral, n, at.turning, c1, c2);

@@ -10,7 +10,7 @@ struct Slope {
     vec3 geometric;     // of the triangle
     vec3 shading;       // interpolated from the vertices
     vec3 refracting;    // of the mean slope over the wavefront; in geometric acoustics that of `shading`
-    vec3 turning;       // change of `refracting` per mm across the path, in the image plane; 0 in geometric acoustics
+    vec3 turning;       // change of `refracting` per mm across the path, in the image plane
     vec3 ray;           // of the mean slope over what one of the aperture's rays stands for, where it is asked for
     float width;        // deviation of the sine of incidence over the beam
 };
@@ -37,6 +37,11 @@ vec3 partly_turned(vec3 n, float coherence, vec3 d) {
     float whole = sqrt(max(1.0 - dot(across, across), 1e-6));
     float met = max(whole + coherence * facing, 0.0) / 2.0;
     return normalize(met * across - whole * whole * d);
+}
+
+// The way along a surface of normal n from where a path meets it to where a parallel one does, 1 mm beside it.
+vec3 across_surface(vec3 direction, vec3 lateral, vec3 n) {
+    return lateral + dot(lateral, n) / max(-dot(direction, n), LEAST_FACING) * direction;
 }
 
 // `row` is that of the path's time; `spread` the variance that the path has across, mm^2. `rays`: also for a ray alone.
@@ -86,8 +91,7 @@ Slope slope_at(Met here, Path path, uint row, float spread, bool rays) {
     }
 
     vec3 corners[3] = { n[0].xyz, n[1].xyz, n[2].xyz };
-    slope.turning = vec3(0.0);
-    if (wide) slope.turning = side * coherence * surface_turning(hit, path.lateral, corners);
+    slope.turning = side * coherence * surface_turning(hit, across_surface(path.direction, path.lateral, slope.refracting), corners);
     slope.width = 0.0;
     if ((frame.flags & FLAG_FOOTPRINT) != 0u) {
         float lateral = rows[row].sigma_lateral;
@@ -130,10 +134,7 @@ bool transmit_path(inout Path path, vec3 n, vec3 n_geometric, float c1, float c2
 // the growth per mm; returns the same behind it, where the path's lateral axis is `beside`. At total reflection, which
 // only a part of the beam passes, both go on as they came.
 vec2 strip_behind(vec2 strip, vec3 direction, vec3 lateral, vec3 beside, vec3 n, vec3 turning, float c1, float c2) {
-    float facing = max(-dot(direction, n), LEAST_FACING);
-    // From where this path meets the plane to where the neighbouring one does, for 1 mm between them.
-    vec3 shift = lateral + dot(lateral, n) / facing * direction;
-    float across = dot(shift, beside);
+    float across = dot(across_surface(direction, lateral, n), beside);
     // So near to it that both go through, so far that rounding does not matter.
     float part = min(BENDING_STEP / max(abs(strip.x), LEAST_PITCH), BENDING_ANGLE / max(abs(strip.y), LEAST_PITCH));
     vec3 middle, aside;

@@ -47,6 +47,7 @@ mod skip;
 mod speckle;
 mod squeeze;
 mod stages;
+mod strips;
 #[cfg(test)]
 mod sweep;
 mod thickness;

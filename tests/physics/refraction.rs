@@ -18,7 +18,7 @@ pub const RADIUS: f64 = 5.0;
 pub const AXIS: f64 = 30.0;
 const BEHIND: f64 = 20.0;
 /// Speed around it, mm/us.
-const AROUND: f64 = 1.540;
+pub const AROUND: f64 = 1.540;
 /// Number of sides of the prism in its place: its sides are 2 um inside the cylinder.
 const SIDES: u32 = 768;
 
@@ -105,7 +105,7 @@ pub fn a_slower_cylinder_casts_the_edge_shadow_of_its_entry_angles() -> Check {
 
 /// Place and direction (x, z) of the ray of impact parameter `b` on leaving the cylinder of speed
 /// `inside`, axis at the origin.
-fn passage(b: f64, inside: f64) -> [DVec3; 2] {
+pub fn passage(b: f64, inside: f64) -> [DVec3; 2] {
     let incidence = (b / RADIUS).asin();
     let refracted = (inside / AROUND * b / RADIUS).asin();
     // Turned towards the axis where sound is slower.

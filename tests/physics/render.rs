@@ -92,10 +92,16 @@ fn narrow(a: &Accumulator) -> Vec<i32> {
 
 /// The frame of `scene`.
 pub fn twin(scene: &Scene) -> Frame {
+    twin_of(scene, |_| ())
+}
+
+/// The frame of `scene` if its segments are changed behind the trace.
+pub fn twin_of(scene: &Scene, change: impl Fn(&mut Segment)) -> Frame {
     let inputs = Inputs::new(scene);
     let world = inputs.world();
     let traced = inputs.traced();
-    let segments: Vec<Segment> = traced.segments.concat();
+    let mut segments: Vec<Segment> = traced.segments.concat();
+    segments.iter_mut().for_each(change);
     let volume = scatter::scatter(&world, &segments);
     let points = scatter::points(&world, &segments);
     let single = |v: Vec<f64>| v.iter().map(|&x| x as f32).collect::<Vec<f32>>();

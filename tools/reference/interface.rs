@@ -11,7 +11,7 @@ use super::stack::Stack;
 use super::wavefront::{Slope, turned};
 use super::world::{Crossing, World};
 use insonify::sim::layout::{
-    BENDING_ANGLE, BENDING_STEP, FLAG_COHERENT, LEAST_FACING, LEAST_PITCH, Row, Surface, Tissue,
+    BENDING_ANGLE, BENDING_STEP, FLAG_COHERENT, LEAST_PITCH, Row, Surface, Tissue,
 };
 
 /// Roughness exponent from which on a surface is a perfect mirror.
@@ -171,8 +171,7 @@ impl Interface {
     pub(super) fn strip_behind(&self, path: &Path, n: DVec3, beside: DVec3) -> [f64; 2] {
         let [distance, growth] = path.strip;
         let [before, behind] = self.fluids;
-        let facing = (-path.direction.dot(n)).max(LEAST_FACING.into());
-        let shift = path.lateral + path.lateral.dot(n) / facing * path.direction;
+        let shift = path.across_surface(n);
         let least = f64::from(LEAST_PITCH);
         let part = (f64::from(BENDING_STEP) / distance.abs().max(least))
             .min(f64::from(BENDING_ANGLE) / growth.abs().max(least));

@@ -7,7 +7,7 @@ use super::geometry::{beam_weight, world_line};
 use super::interface::MIRROR;
 use super::random::pcg4d;
 use super::stack::Stack;
-use insonify::sim::layout::Frame;
+use insonify::sim::layout::{Frame, LEAST_FACING};
 
 /// Purpose of the random numbers that are added to an echo before it is rounded down.
 const PURPOSE_DITHER: u32 = 0x51ed_270b;
@@ -95,6 +95,12 @@ impl Path {
         let (l, layer) = self.scanline(frame.scanlines);
         let on_face = layer * frame.face_lines() + frame.first_line + l;
         pcg4d([on_face, n, self.key(), frame.seed ^ purpose])
+    }
+
+    /// The way along a surface of normal `n` from where the path meets it to where a parallel one does, 1 mm beside it.
+    pub(super) fn across_surface(&self, n: DVec3) -> DVec3 {
+        let facing = (-self.direction.dot(n)).max(LEAST_FACING.into());
+        self.lateral + self.lateral.dot(n) / facing * self.direction
     }
 
     /// Scanline and layer.

@@ -12,8 +12,8 @@ use super::straight::{Start, Toggled};
 use super::world::{World, affine};
 use super::{Accumulator, Segment, acoustics};
 use insonify::sim::layout::{
-    Counters, FLAG_FACE_REFLECTION, FLAG_ROUGH_TRANSMISSION, Frame, LEAST_MAIN, LEAST_PASSED,
-    LEAST_PITCH, SAMPLING_MAIN_PATH, SAMPLING_SHARED_PRIMARY, STRIP_LIMIT,
+    Counters, FLAG_FACE_REFLECTION, FLAG_ROUGH_TRANSMISSION, FLAG_WAVEFRONT, Frame, LEAST_MAIN,
+    LEAST_PASSED, LEAST_PITCH, SAMPLING_MAIN_PATH, SAMPLING_SHARED_PRIMARY, STRIP_LIMIT,
 };
 
 mod branches;
@@ -332,7 +332,9 @@ impl<'a> Tracer<'a> {
         if self.is_steady(path) {
             path.bent += interface.ray_bending(path);
         }
-        path.lens[2] += f64::from(row.aperture) * interface.bending(path, normal);
+        if self.world.frame.flags & FLAG_WAVEFRONT != 0 {
+            path.lens[2] += f64::from(row.aperture) * interface.bending(path, normal);
+        }
         let lateral = (path.lateral - path.lateral.dot(direction) * direction).normalize();
         path.strip = interface.strip_behind(path, normal, lateral);
         path.direction = direction;

@@ -19,7 +19,7 @@ pub(super) struct Slope {
     pub(super) shading: DVec3,
     /// Normal of the mean slope over the wavefront; in geometric acoustics equal to `shading`.
     pub(super) refracting: DVec3,
-    /// Change of `refracting` per mm across the path, in the image plane; 0 in geometric acoustics.
+    /// Change of `refracting` per mm across the path, in the image plane.
     pub(super) turning: DVec3,
     /// Normal of the mean slope over what one of the aperture's rays stands for, by which it turns.
     pub(super) ray: DVec3,
@@ -77,8 +77,7 @@ impl World<'_> {
         let spread = path.spread[0];
         let wide = self.frame.flags & FLAG_WAVEFRONT != 0;
         let (mut corners, mut refracting) = (self.corner_normals(hit), shading);
-        let mut turning = DVec3::ZERO;
-        let mut ray = shading;
+        let (mut ray, mut coherence) = (shading, 1.0);
         if wide {
             let width = f64::from(row.sigma_wavefront).hypot(spread.sqrt());
             let facing = |n: DVec3| (-d.dot(n)).max(f64::from(LEAST_FACING));
@@ -91,16 +90,16 @@ impl World<'_> {
             // What a beam covers of the surface is longer the more it is inclined.
             let narrow = f64::from(row.sigma_lateral)
                 .max(f64::from(RAY_WIDTH) * f64::from(row.sigma_wavefront));
-            let (_, narrow, coherence) = mean(narrow / facing(shading));
-            ray = partly_turned(narrow, coherence, d);
+            let (_, narrow, whole) = mean(narrow / facing(shading));
+            ray = partly_turned(narrow, whole, d);
             let (_, upright, _) = mean(width);
-            let coherence;
             (corners, refracting, coherence) = mean(width / facing(upright));
-            turning = side * coherence * self.turning(hit, corners, path.lateral);
             if coherence <= 0.99999 {
                 refracting = partly_turned(refracting, coherence, d);
             }
         }
+        let over = path.across_surface(refracting);
+        let turning = side * coherence * self.turning(hit, corners, over);
         let mut width = 0.0;
         if self.frame.flags & FLAG_FOOTPRINT != 0 {
             // In the plane of incidence; along the image where there is none.

@@ -131,16 +131,12 @@ fn neighbouring_paths_part_as_refraction_says() {
         (fan.frame.kind, fan.frame.field_of_view) = (2, 0.01);
         fan.block([-80.0, -80.0, 20.0], [80.0, 80.0, 90.0], 1, 0);
         close(strip_behind(&fan), [0.2, 0.01 * c2 / c1], 1e-3);
+
+        let (mut ball, radius) = (base(), 40.0);
+        ball.sphere(DVec3::new(0.0, 0.0, 10.0 + radius), radius, 48, 1, 0);
+        // A sphere of triangles.
+        close(strip_behind(&ball), [0.1, 0.1 * (c2 / c1 - 1.0) / radius], 0.03);
     }
-    let (mut ball, radius) = (Fixture::new(fluids()), 40.0);
-    ball.sphere(DVec3::new(0.0, 0.0, 10.0 + radius), radius, 48, 1, 0);
-    ball.frame.flags |= FLAG_WAVEFRONT;
-    (ball.frame.max_reflections, ball.frame.width) = (0, pitch);
-    for row in &mut ball.rows {
-        row.sigma_wavefront = 2.0;
-    }
-    // A sphere of triangles.
-    close(strip_behind(&ball), [0.1, 0.1 * (c2 / c1 - 1.0) / radius], 0.03);
 }
 
 /// What is reflected goes on as far apart as the scanlines: neighbours may have been reflected elsewhere.
