@@ -16,21 +16,21 @@ layout(std430, binding = 3) restrict buffer ApertureBuffer { Aperture apertures[
 
 const uint THREADS = 64u;
 const float BAND_COUNT = float(APERTURE_BANDS);
-const uint WORDS = 32u;
-// Beyond as many pairs of neighbours two share a bit.
+const uint WORDS = 16u;
+// Beyond as many pairs of neighbours two share a bit, or four, or eight: MAX_SCANLINES is eight times that.
 const uint PAIRS = 32u * WORDS;
 
-// For each band a bit for each pair of neighbouring scanlines that lose differently, or turn rays differently.
+// For each band a bit for each pair of neighbouring scanlines that lose differently,
 shared uint unlike[APERTURE_BANDS * WORDS];
+// and for each that turn rays differently.
+shared uint turning[APERTURE_BANDS * WORDS];
 // For each scanline the first node behind a surface that lets hardly anything through, four to a word.
 shared uint fronts[MAX_SCANLINES / 4u];
 // A bit for each node that is one.
 shared uint front_nodes[APERTURE_BANDS / 32u + 1u];
 
-uint node_of(uint layer, int l, uint node) { return (layer * (APERTURE_BANDS + 1u) + node) * frame.scanlines + uint(l); }
-
 // Nepers that the main path of scanline l of a layer has lost down to a node.
-float lost_at(uint layer, int l, uint node) { return apertures[node_of(layer, l, node)].lost; }
+float lost_at(uint layer, int l, uint node) { return apertures[node_at(layer, uint(l), node)].lost; }
 
 // What it loses between two nodes; UNKNOWN where it was not followed.
 float lost_between(float above, float below) { return mix(below - above, UNKNOWN, min(above, below) <= UNKNOWN); }
@@ -39,50 +39,56 @@ float lost_in(uint layer, int l, uint begin, uint end) {
     return lost_between(lost_at(layer, l, begin), lost_at(layer, l, end));
 }
 
-// Sine by which it turns rays there.
-float bent_in(uint layer, int l, uint begin, uint end) {
-    return apertures[node_of(layer, l, end)].bent - apertures[node_of(layer, l, begin)].bent;
-}
+// Sine by which it turns rays in a band.
+float bent_in(uint layer, int l, uint band) { return apertures[node_at(layer, uint(l), band + 1u)].bent; }
 
 // The same `lines` beside scanline l, between two. Rounded alike wherever the frame's first scanline is.
-float bent_between(uint layer, int l, float lines, uint begin, uint end) {
+float bent_beside(uint layer, int l, float lines, uint band) {
     float low = floor(clamp(lines, -1e6, 1e6));
     int last = int(frame.scanlines) - 1, at = l + whole(low);
-    return mix(bent_in(layer, clamp(at, 0, last), begin, end), bent_in(layer, clamp(at + 1, 0, last), begin, end), min(lines - low, 1.0));
+    return mix(bent_in(layer, clamp(at, 0, last), band), bent_in(layer, clamp(at + 1, 0, last), band), min(lines - low, 1.0));
 }
 
 // Bit of the pair of scanline l and the next.
-uint bit_of(int l) { return uint(l) >> (frame.scanlines > PAIRS ? 1u : 0u); }
+uint bit_of(int l) {
+    return uint(l) >> (uint(frame.scanlines > PAIRS) + uint(frame.scanlines > 2u * PAIRS) + uint(frame.scanlines > 4u * PAIRS));
+}
+
+void keep(uint word, uvec2 found) {
+    unlike[word] = found.x;
+    turning[word] = found.y;
+}
 
 void find_unlike(uint layer, uint band) {
-    uint at = 0u, found = 0u;
-    float before = lost_in(layer, 0, band, band + 1u), turned = bent_in(layer, 0, band, band + 1u);
+    uint at = 0u;
+    uvec2 found = uvec2(0u);
+    vec2 before = vec2(lost_in(layer, 0, band, band + 1u), bent_in(layer, 0, band));
     for (int l = 1; l < int(frame.scanlines); ++l) {
         uint bit = bit_of(l - 1);
         if (bit >> 5u != at) {
-            unlike[band * WORDS + at] = found;
-            found = 0u;
+            keep(band * WORDS + at, found);
+            found = uvec2(0u);
             at = bit >> 5u;
         }
-        float lost = lost_in(layer, l, band, band + 1u), bent = bent_in(layer, l, band, band + 1u);
+        vec2 beside = vec2(lost_in(layer, l, band, band + 1u), bent_in(layer, l, band));
         // NaN, too, is unlike.
-        if (!(abs(lost - before) <= APERTURE_ALIKE && abs(bent - turned) <= BENT_ALIKE)) found |= 1u << (bit & 31u);
-        before = lost;
-        turned = bent;
+        bvec2 alike = lessThanEqual(abs(beside - before), vec2(APERTURE_ALIKE, BENT_ALIKE));
+        found |= mix(uvec2(1u << (bit & 31u)), uvec2(0u), alike);
+        before = beside;
     }
-    unlike[band * WORDS + at] = found;
+    keep(band * WORDS + at, found);
 }
 
-// True if neighbours from the first scanline to the last differ in some band of a step.
-bool differs(int first, int last, uint begin, uint end) {
+// Not 0 in x if neighbours from the first scanline to the last lose differently in a band, in y if they turn rays differently.
+uvec2 differs(int first, int last, uint band) {
     uint low = bit_of(first), high = bit_of(last - 1);
-    uint found = 0u;
+    uvec2 found = uvec2(0u);
     for (uint word = low >> 5u; word <= high >> 5u; ++word) {
         uint mask = 0xffffffffu << (word == low >> 5u ? low & 31u : 0u);
         mask &= 0xffffffffu >> (word == high >> 5u ? 31u - (high & 31u) : 0u);
-        for (uint band = begin; band < end; ++band) found |= unlike[band * WORDS + word] & mask;
+        found |= mask & uvec2(unlike[band * WORDS + word], turning[band * WORDS + word]);
     }
-    return found != 0u;
+    return found;
 }
 
 // The first node behind such a surface; beyond all nodes where there is none.
@@ -107,11 +113,14 @@ bool crosses_front(int above, uint begin, int below, uint end) {
     return begin < before && before <= end + size && behind <= end && behind + size > begin;
 }
 
-// Scanlines beside the target's that a ray has crossed at a depth, in nodes, for each mm beside it on the aperture.
-float lines_per_mm(float at, uint node) {
+// Distance of neighbouring scanlines at a depth, in nodes, mm.
+float pitch_at(float at) {
     vec2 pitch = line_pitch();
-    return (1.0 - at / float(node)) / max(pitch.x + frame.depth * at / BAND_COUNT * pitch.y, LEAST_PITCH);
+    return max(pitch.x + frame.depth * at / BAND_COUNT * pitch.y, LEAST_PITCH);
 }
+
+// Scanlines beside the target's that a ray has crossed at a depth, in nodes, for each mm beside it on the aperture.
+float lines_per_mm(float at, uint node) { return (1.0 - at / float(node)) / pitch_at(at); }
 
 // The farther from the target, the more bands at once: where between them something lies matters less.
 uint step_above(uint node, uint end) {
@@ -128,53 +137,86 @@ bool front_near(uint begin, uint end) {
     return found != 0u;
 }
 
+// A target, and how its apertures see it.
+struct Target {
+    uint layer;
+    int l;              // scanline
+    uint node;
+    uint row;           // of the samples
+    float spacing;      // of rays on the aperture, mm
+    float deviations;   // the same, of the receive aperture
+};
+
 // Nepers that each ray loses on its way to the target, over what the scanline's own path does.
 float lost[APERTURE_RAYS];
-// By how much each ray of the receive aperture misses the target, mm, over what one on that path does; and how far from the axis
-// there that is which comes from as many deviations beside the axis on the transmit aperture, whose focus is another.
+// By how much each ray of the receive aperture misses the target, mm, over what one on that path does; and how much farther
+// from the axis there that is which comes from as many deviations beside the axis on the transmit aperture, whose focus is another.
 float missed[APERTURE_RAYS];
 float aside[APERTURE_RAYS];
 
+// Place of a ray on the aperture, in distances of rays from its middle.
+float place_of(uint ray) { return float(ray) + 0.5 * (1.0 - float(APERTURE_RAYS)); }
+
 // Scanlines beside the target's that a ray crosses at a depth, in nodes, for each deviation beside it on the transmit aperture.
-float lines_sent(uint row, uint node, float at) {
-    vec2 pitch = line_pitch();
-    float way = frame.depth / BAND_COUNT * (float(node) - at);
-    return (rows[row].defocus + rows[row].transmit_sine * way) / max(pitch.x + frame.depth * at / BAND_COUNT * pitch.y, LEAST_PITCH);
+float lines_sent(Target target, float at) {
+    float way = frame.depth / BAND_COUNT * (float(target.node) - at);
+    return (rows[target.row].defocus + rows[target.row].transmit_sine * way) / pitch_at(at);
 }
 
-// Follows the rays, `spacing` mm apart on the aperture, from the target up; `different` has a bit for each step in which
-// scanlines lose differently. What all rays of a step share is computed once.
-void follow_rays(uint layer, int l, uint node, uint row, float spacing, float deviations, uint different) {
-    float first = 0.5 * (1.0 - float(APERTURE_RAYS));
-    float middle = float(l) + 0.5, last = float(frame.scanlines - 1u);
+// Adds what rays lose in a step.
+void lose(Target target, uint begin, uint end) {
+    float middle = float(target.l) + 0.5, last = float(frame.scanlines - 1u);
+    float half_way = target.spacing * lines_per_mm(0.5 * float(begin + end), target.node);
+    float own = lost_in(target.layer, target.l, begin, end);
     for (uint i = 0u; i < APERTURE_RAYS; ++i) {
-        lost[i] = missed[i] = 0.0;
-        aside[i] = rows[row].defocus * deviations * (first + float(i));
+        float crossed = clamp(floor(place_of(i) * half_way + middle), 0.0, last);
+        float there = lost_in(target.layer, whole(crossed), begin, end);
+        lost[i] += mix(there - own, 0.0, min(there, own) <= UNKNOWN);
     }
+    if (!front_near(begin, end)) return;
+    vec2 ends = target.spacing * vec2(lines_per_mm(float(begin), target.node), lines_per_mm(float(end), target.node));
+    for (uint i = 0u; i < APERTURE_RAYS; ++i) {
+        vec2 crossed = clamp(floor(place_of(i) * ends + middle), vec2(0.0), vec2(last));
+        lost[i] += mix(0.0, lost_of(0.0), crosses_front(whole(crossed.x), begin, whole(crossed.y), end));
+    }
+}
+
+// Adds by how much rays miss the target as they are turned in a band.
+void turn(Target target, uint band) {
+    float at = float(band) + 0.5;
+    float way = frame.depth / BAND_COUNT * (float(target.node) - at);
+    float received = target.spacing * lines_per_mm(at, target.node), sent = target.deviations * lines_sent(target, at);
+    float own = bent_in(target.layer, target.l, band);
+    for (uint i = 0u; i < APERTURE_RAYS; ++i) {
+        missed[i] += (bent_beside(target.layer, target.l, place_of(i) * received, band) - own) * way;
+        aside[i] += (bent_beside(target.layer, target.l, place_of(i) * sent, band) - own) * way;
+    }
+}
+
+// Follows the rays from the target up, through what scanlines beside it do differently. False if there is nothing like that.
+bool follow_rays(Target target) {
+    for (uint i = 0u; i < APERTURE_RAYS; ++i) lost[i] = missed[i] = aside[i] = 0.0;
+    float widest = 0.5 * float(APERTURE_RAYS) * target.spacing, outermost = 0.5 * float(APERTURE_RAYS) * target.deviations;
+    bool found = false, bends = target.node % LEVEL_STEP == 0u;
     uint begin;
-    for (uint end = node; end > 0u && different != 0u; end = begin) {
-        begin = step_above(node, end);
-        bool counts = (different & 1u) != 0u;
-        different >>= 1u;
-        if (!counts) continue;
-        float half_way = spacing * lines_per_mm(0.5 * float(begin + end), node);
-        float own = lost_in(layer, l, begin, end), turned = bent_in(layer, l, begin, end);
-        float way = frame.depth / BAND_COUNT * (float(node) - 0.5 * float(begin + end));
-        float sent_half_way = deviations * lines_sent(row, node, 0.5 * float(begin + end));
-        for (uint i = 0u; i < APERTURE_RAYS; ++i) {
-            float crossed = clamp(floor((first + float(i)) * half_way + middle), 0.0, last);
-            float there = lost_in(layer, whole(crossed), begin, end);
-            lost[i] += mix(there - own, 0.0, min(there, own) <= UNKNOWN);
-            missed[i] += (bent_between(layer, l, (first + float(i)) * half_way, begin, end) - turned) * way;
-            aside[i] += (bent_between(layer, l, (first + float(i)) * sent_half_way, begin, end) - turned) * way;
+    for (uint end = target.node; end > 0u; end = begin) {
+        begin = step_above(target.node, end);
+        vec2 sent = abs(vec2(lines_sent(target, float(begin)), lines_sent(target, float(end))));
+        float most = max(widest * lines_per_mm(float(begin), target.node), outermost * max(sent.x, sent.y));
+        int reach = whole(ceil(clamp(most, 0.0, 1e6)));
+        int low = max(target.l - reach, 0), high = min(target.l + reach, int(frame.scanlines) - 1);
+        if (low >= high) continue;
+        bool loses = false;
+        for (uint band = begin; band < end; ++band) {
+            uvec2 different = differs(low, high, band);
+            bool turns = bends && different.y != 0u;
+            if (turns) turn(target, band);
+            loses = loses || different.x != 0u;
+            found = found || loses || turns;
         }
-        if (!front_near(begin, end)) continue;
-        vec2 ends = spacing * vec2(lines_per_mm(float(begin), node), lines_per_mm(float(end), node));
-        for (uint i = 0u; i < APERTURE_RAYS; ++i) {
-            vec2 crossed = clamp(floor((first + float(i)) * ends + middle), vec2(0.0), vec2(last));
-            lost[i] += mix(0.0, lost_of(0.0), crosses_front(whole(crossed.x), begin, whole(crossed.y), end));
-        }
+        if (loses) lose(target, begin, end);
     }
+    return found;
 }
 
 // The part of each ray that reaches the target; of those of one Gaussian aperture.
@@ -182,29 +224,25 @@ float weights[APERTURE_RAYS];
 
 // Factor on the amplitude of speckle around a target, in nepers, by rays that miss it. A ray of the transmit aperture and one of
 // the receive aperture hear together what both meet: the overlap of two Gaussians as wide as a focus, the mean over all pairs of
-// rays, over that of rays which nothing bends. Never brighter. `deviations` lie between two rays.
-float level_of(uint row, float deviations) {
-    float first = 0.5 * (1.0 - float(APERTURE_RAYS));
-    float defocus = rows[row].defocus;
-    float fall = 1.0 / (rows[row].variances - defocus * defocus);
+// rays, over that of rays which nothing bends. Never brighter.
+float level_of(Target target) {
+    float defocus = rows[target.row].defocus;
+    float fall = 1.0 / (rows[target.row].variances - defocus * defocus);
     float most = 0.0;
-    for (uint i = 0u; i < APERTURE_RAYS; ++i) {
-        float more = aside[i] - defocus * deviations * (first + float(i));
-        most = max(most, max(missed[i] * missed[i], more * more) * fall);
-    }
+    for (uint i = 0u; i < APERTURE_RAYS; ++i) most = max(most, max(missed[i] * missed[i], aside[i] * aside[i]) * fall);
     if (most < LEAST_MISSED) return 0.0;
     float sent = 0.0, heard = 0.0, met = 0.0;
     for (uint i = 0u; i < APERTURE_RAYS; ++i) {
-        float from = deviations * (first + float(i));
+        float from = target.deviations * place_of(i);
         weights[i] *= exp(-from * from);
         heard += weights[i];
     }
     for (uint i = 0u; i < APERTURE_RAYS; ++i) {
-        float even = defocus * deviations * (first + float(i));
+        float even = defocus * target.deviations * place_of(i);
         sent += weights[i] * exp(-even * even * fall);
         float overlaps = 0.0;
         for (uint j = 0u; j < APERTURE_RAYS; ++j) {
-            float apart = aside[i] - missed[j];
+            float apart = even + aside[i] - missed[j];
             overlaps += weights[j] * exp(-apart * apart * fall);
         }
         met += weights[i] * overlaps;
@@ -213,31 +251,21 @@ float level_of(uint row, float deviations) {
     return mix(LEAST_LEVEL, min(level, 0.0), level > LEAST_LEVEL);
 }
 
-// What the apertures of a target have on the way. `gain`: for each the mean over its rays of the part that reaches the target,
+// Gain and level of a target. The gain: for each of its apertures the mean over its rays of the part that reaches the target,
 // over that of its own scanline; of the two-way amplitude that main paths carry, one way has the root.
 vec2 converged(uint layer, int l, uint node, uint row) {
     vec2 halves = vec2(rows[row].transmit_half, rows[row].receive_half);
     float widest = max(halves.x, halves.y);
     float spacing = 2.0 * widest / float(APERTURE_RAYS);
     float deviations = spacing / max(rows[row].receive_sine * frame.depth * float(node) / BAND_COUNT, LEAST_PITCH);
-    uint different = 0u, begin, bit = 1u;
-    for (uint end = node; end > 0u; end = begin) {
-        begin = step_above(node, end);
-        vec2 sent = abs(vec2(lines_sent(row, node, float(begin)), lines_sent(row, node, float(end))));
-        float most = max(widest * lines_per_mm(float(begin), node), 0.5 * float(APERTURE_RAYS) * deviations * max(sent.x, sent.y));
-        int reach = whole(ceil(clamp(most, 0.0, 1e6)));
-        int low = max(l - reach, 0), high = min(l + reach, int(frame.scanlines) - 1);
-        if (low < high && differs(low, high, begin, end)) different |= bit;
-        bit <<= 1u;
-    }
-    if (different == 0u) return vec2(0.0);
+    Target target = Target(layer, l, node, row, spacing, deviations);
+    if (!follow_rays(target)) return vec2(0.0);
     // What would lie beyond the face is no element. A phased array is modelled as a point, its aperture is all there.
     float first = float(frame.first_line) + float(l) + 0.5;
     float at_face = mix(0.0, 1.0 / max(line_pitch().x, LEAST_PITCH), frame.kind != KIND_PHASED);
-    follow_rays(layer, l, node, row, spacing, deviations, different);
     vec2 sum = vec2(0.0), count = vec2(0.0);
     for (uint i = 0u; i < APERTURE_RAYS; ++i) {
-        float beside = spacing * (float(i) + 0.5) - widest;
+        float beside = spacing * place_of(i);
         float element = first + beside * at_face;
         bool exists = element >= 0.0 && element <= float(face_lines());
         // The narrower aperture has some of the rays, the outermost in part.
@@ -249,7 +277,7 @@ vec2 converged(uint layer, int l, uint node, uint row) {
         count += share;
     }
     float gain = log(max(sum.x, 1e-30) / count.x) + log(max(sum.y, 1e-30) / count.y);
-    return vec2(gain, level_of(row, deviations));
+    return vec2(gain, level_of(target));
 }
 
 void main() {

@@ -12,10 +12,10 @@ const float UNKNOWN = -1e3;
 
 bool loses_by_aperture() { return (frame.flags & FLAG_APERTURE) != 0u; }
 
-uint aperture_at(uint line, uint node) {
-    uint layer = line / frame.scanlines;
-    return (layer * (APERTURE_BANDS + 1u) + node) * frame.scanlines + line % frame.scanlines;
-}
+// Place of a node of scanline l of a layer.
+uint node_at(uint layer, uint l, uint node) { return (layer * (APERTURE_BANDS + 1u) + node) * frame.scanlines + l; }
+
+uint aperture_at(uint line, uint node) { return node_at(line / frame.scanlines, line % frame.scanlines, node); }
 
 // Nepers that a main path of this weight has lost.
 float lost_of(float weight) { return -log(max(weight, LEAST_MAIN)); }
@@ -30,22 +30,32 @@ float bands_at(float time) {
     return clamp(mix(0.0, time * frame.speed / frame.depth, time > 0.0), 0.0, 1.0) * float(APERTURE_BANDS);
 }
 
+// Two nodes of a line, and where between them a place is; nodes are `step` apart.
+struct Between {
+    uint above;
+    uint below;
+    float part;   // of the way from the one to the other
+};
+
+Between nodes_at(uint line, float time, uint step) {
+    float at = bands_at(time) / float(step);
+    uint node = min(uint(whole(floor(at))), APERTURE_BANDS / step - 1u);
+    uint above = aperture_at(line, step * node);
+    return Between(above, above + step * frame.scanlines, at - float(node));
+}
+
 // Factor on amplitudes of a line at a one-way time, in nepers, where its main path has lost `lost` nepers. Between two nodes
 // it changes with the depth, but where a surface takes much away, with that: in front of it is what was at the node before.
 float aperture_nepers(uint line, float time, float lost) {
-    float at = bands_at(time);
-    uint node = min(uint(whole(floor(at))), APERTURE_BANDS - 1u);
-    uint above = aperture_at(line, node), below = aperture_at(line, node + 1u);
-    float lost_above = APERTURES[above].lost;
-    float jump = APERTURES[below].lost - lost_above;
-    float part = at - float(node);
-    if (jump > APERTURE_JUMP) part = clamp((lost - lost_above) / jump, 0.0, 1.0);
-    return mix(APERTURES[above].gain, APERTURES[below].gain, part);
+    Between nodes = nodes_at(line, time, 1u);
+    float lost_above = APERTURES[nodes.above].lost;
+    float jump = APERTURES[nodes.below].lost - lost_above;
+    if (jump > APERTURE_JUMP) nodes.part = clamp((lost - lost_above) / jump, 0.0, 1.0);
+    return mix(APERTURES[nodes.above].gain, APERTURES[nodes.below].gain, nodes.part);
 }
 
 // Factor on the amplitude of speckle of a line at a one-way time, in nepers, by surfaces that bend its beam.
 float aperture_level(uint line, float time) {
-    float at = bands_at(time);
-    uint node = min(uint(whole(floor(at))), APERTURE_BANDS - 1u);
-    return mix(APERTURES[aperture_at(line, node)].level, APERTURES[aperture_at(line, node + 1u)].level, at - float(node));
+    Between nodes = nodes_at(line, time, LEVEL_STEP);
+    return mix(APERTURES[nodes.above].level, APERTURES[nodes.below].level, nodes.part);
 }

@@ -47,7 +47,7 @@ bool is_passed_by(inout Path path, float speed) {
 const float FOREVER = 1e18;
 
 // Writes what a main path loses up to a time, us, at the nodes that it reaches before, `rate` nepers per us from where it is, and
-// how rays on it are bent; in front of its start, and where it is not followed, nobody knows what it loses.
+// how surfaces on the way to each have turned rays; in front of its start, and where it is not followed, nobody knows what it loses.
 void write_losses(uint line, inout uint node, inout Path path, float rate, float until, bool known) {
     float spacing = frame.depth / (frame.speed * float(APERTURE_BANDS));
     float lost = lost_of(path.weight);
@@ -56,6 +56,7 @@ void write_losses(uint line, inout uint node, inout Path path, float rate, float
         uint at = aperture_at(line, node);
         apertures[at].lost = mix(UNKNOWN, min(lost + rate * way, lost_of(0.0)), known && way >= 0.0);
         apertures[at].bent = path.bent;
+        path.bent = 0.0;
     }
 }
 

@@ -12,7 +12,7 @@ struct Path {
     float time;         // one way, us
     vec3 spread;        // lateral variance a + 2 b x + c x^2 after rough reflections
     vec3 lens;          // lateral offset a + b x + c x^2 of what comes one deviation beside the axis
-    float bent;         // sine by which surfaces have turned a ray on a main path, towards its lateral axis
+    float bent;         // sine by which surfaces have turned a ray on a main path behind the last node, towards its lateral axis
     vec2 strip;         // distance of the neighbouring scanline's path across, mm, and its growth per mm
     uint interactions; uint reflections; uint crossings;
     uint left_instance; uint left_primitive; // the triangle that it starts on; NONE: none

@@ -63,6 +63,7 @@ const uint APERTURE_BANDS = 48u;    // bands of equal depth in which the losses 
 const uint APERTURE_RAYS = 16u;     // rays from the aperture to a target
 const float APERTURE_ALIKE = 2e-3;  // nepers: scanlines lose alike in a band if no neighbours differ by more
 const float RAY_WIDTH = 0.25;        // deviation over which a surface turns one of them, over that of the whole wavefront
+const uint LEVEL_STEP = 2u;         // nodes from one to the next at which rays that miss the target are followed
 const float BENT_ALIKE = 1e-4;      // and turn rays alike in a band if no neighbours' sines differ by more
 const float LEAST_MISSED = 2e-5;    // squared distance by which rays miss a target, over the beams' variance, that counts
 const float LEAST_LEVEL = -7.0;     // nepers: speckle is not weaker by surfaces that bend its beam
@@ -207,12 +208,12 @@ struct Segment {
                            // handedness: e_e = sign(strip) * cross(d, e_l)
 };
 
-// What lies on the way to a scanline's target at a node of depth.
+// A node of depth of a scanline, by what lies on the way there.
 struct Aperture {
     float gain;    // nepers: factor on amplitudes, as the apertures converge on the target from beside the main path, too
     float lost;    // nepers that the main path has lost
-    float bent;    // sine by which surfaces have turned a ray on the main path, towards the lateral axis
-    float level;   // nepers: factor on the amplitude of speckle, as rays of the apertures miss the target
+    float bent;    // sine by which surfaces turn a ray on the main path between the node above and this one, towards the lateral axis
+    float level;   // nepers: factor on the amplitude of speckle, as rays of the apertures miss the target; of each LEVEL_STEPth node
 };
 
 // The state of a main path on arrival at a surface, before any random choice.

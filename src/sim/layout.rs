@@ -179,6 +179,8 @@ constants! {
     pub const RAY_WIDTH: f32 = 0.25;
     /// Scanlines turn rays alike in a band if no neighbours' sines differ by more.
     pub const BENT_ALIKE: f32 = 1e-4;
+    /// Nodes from one to the next at which rays that miss a target are followed.
+    pub const LEVEL_STEP: u32 = 2;
     /// Squared distance by which rays miss a target, over the beams' variance, from which on it counts.
     pub const LEAST_MISSED: f32 = 2e-5;
     /// Nepers: speckle is not weaker by surfaces that bend its beam.

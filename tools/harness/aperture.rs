@@ -42,7 +42,7 @@ pub(super) fn passed(frame: &Frame) -> Vec<Passed> {
             [left, left + width, begin * 60.0, begin * 60.0 + 12.0, within(0.005, 0.1)]
         });
         for l in 0..frame.scanlines {
-            let (mut sum, mut bent) = (0.0, 0.0);
+            let mut sum = 0.0;
             for node in 1..nodes {
                 let inside = |[left, right, top, bottom, _]: &[f64; 5]| {
                     (*left..*right).contains(&f64::from(l))
@@ -60,7 +60,7 @@ pub(super) fn passed(frame: &Frame) -> Vec<Passed> {
                     let beside = (2.0 * f64::from(l) - left - right) / (right - left);
                     if entered && beside.abs() < 1.0 { power * beside } else { 0.0 }
                 };
-                bent += organs.iter().map(lens).sum::<f64>();
+                let bent = organs.iter().map(lens).sum::<f64>();
                 passed[aperture::place(frame, layer * frame.scanlines + l, node)] =
                     Passed { lost: sum, bent };
             }

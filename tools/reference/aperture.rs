@@ -4,7 +4,7 @@ use super::geometry::line_pitch;
 use insonify::sim::layout::{
     APERTURE_ALIKE, APERTURE_BANDS, APERTURE_FRONT, APERTURE_JUMP, APERTURE_RAYS, Aperture,
     BENT_ALIKE, FLAG_APERTURE, Frame, KIND_PHASED, LEAST_LEVEL, LEAST_MAIN, LEAST_MISSED,
-    LEAST_PITCH, Row,
+    LEAST_PITCH, LEVEL_STEP, Row,
 };
 
 /// True if losses count by the aperture.
@@ -20,12 +20,12 @@ pub fn lost_of(weight: f64) -> f64 {
 /// Loss where the main path was not followed.
 pub const UNKNOWN: f64 = -1e3;
 
-/// Losses and bending of a main path down to a node.
+/// A node of a main path.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Passed {
-    /// Nepers that it has lost.
+    /// Nepers that it has lost down to it.
     pub lost: f64,
-    /// Sine by which a ray on it has been turned towards its lateral axis.
+    /// Sine by which a ray on it is turned towards its lateral axis between the node above and this one.
     pub bent: f64,
 }
 
@@ -34,7 +34,7 @@ pub struct Passed {
 pub struct Found {
     /// Factor on amplitudes, nepers.
     pub gain: f64,
-    /// Factor on the amplitude of speckle, nepers.
+    /// Factor on the amplitude of speckle, nepers; of each LEVEL_STEPth node.
     pub level: f64,
 }
 
@@ -54,19 +54,20 @@ pub fn time_of(frame: &Frame, node: u32) -> f64 {
     f64::from(frame.depth) / f64::from(frame.speed) * f64::from(node) / f64::from(APERTURE_BANDS)
 }
 
-/// The node before a one-way time, and the share of the way from there to the next.
-fn bands(frame: &Frame, time: f64) -> (u32, f64) {
-    let bands = f64::from(APERTURE_BANDS);
-    let way = (time * f64::from(frame.speed) / f64::from(frame.depth)).clamp(0.0, 1.0) * bands;
-    let node = (way.floor() as u32).min(APERTURE_BANDS - 1);
-    (node, way - f64::from(node))
+/// The node before a one-way time, of nodes `step` apart, and the share of the way from there to the next.
+fn bands(frame: &Frame, time: f64, step: u32) -> (u32, f64) {
+    let bands = APERTURE_BANDS / step;
+    let way = (time * f64::from(frame.speed) / f64::from(frame.depth)).clamp(0.0, 1.0);
+    let way = way * f64::from(bands);
+    let node = (way.floor() as u32).min(bands - 1);
+    (step * node, way - f64::from(node))
 }
 
 /// Factor on the amplitude of speckle of a line at a one-way time, in nepers, by surfaces that bend its beam.
 pub fn level(frame: &Frame, nodes: &[Aperture], line: u32, time: f64) -> f64 {
-    let (node, share) = bands(frame, time);
+    let (node, share) = bands(frame, time, LEVEL_STEP);
     let [above, below] =
-        [node, node + 1].map(|node| f64::from(nodes[place(frame, line, node)].level));
+        [node, node + LEVEL_STEP].map(|node| f64::from(nodes[place(frame, line, node)].level));
     above + share * (below - above)
 }
 
@@ -79,7 +80,7 @@ pub fn nepers(
     time: f64,
     lost: f64,
 ) -> f64 {
-    let (node, share) = bands(frame, time);
+    let (node, share) = bands(frame, time, 1);
     let [above, below] = [node, node + 1].map(|node| at(place(frame, line, node)));
     let jump = below[1] - above[1];
     let part = match jump > f64::from(APERTURE_JUMP) {
@@ -128,20 +129,19 @@ impl Target<'_> {
         (above != UNKNOWN && below != UNKNOWN).then_some(below - above)
     }
 
-    /// Sine by which scanline `l` turns a ray between two nodes.
-    fn bent_in(&self, l: u32, step: [u32; 2]) -> f64 {
+    /// Sine by which scanline `l` turns a ray in a band.
+    fn bent_in(&self, l: u32, band: u32) -> f64 {
         let line = self.layer * self.frame.scanlines + l;
-        let [above, below] = step.map(|n| self.passed[place(self.frame, line, n)].bent);
-        below - above
+        self.passed[place(self.frame, line, band + 1)].bent
     }
 
     /// The same `lines` beside scanline `l`, between two.
-    fn bent_between(&self, l: u32, lines: f64, step: [u32; 2]) -> f64 {
+    fn bent_beside(&self, l: u32, lines: f64, band: u32) -> f64 {
         let low = lines.clamp(-1e6, 1e6).floor();
         let last = i64::from(self.frame.scanlines) - 1;
         let [below, above] = [0, 1].map(|next| {
             let at = (i64::from(l) + low as i64 + next).clamp(0, last);
-            self.bent_in(at as u32, step)
+            self.bent_in(at as u32, band)
         });
         below + (lines - low).min(1.0) * (above - below)
     }
@@ -209,24 +209,38 @@ impl Target<'_> {
         line.clamp(0.0, f64::from(self.frame.scanlines - 1)) as u32
     }
 
-    /// True if in some band of a step neighbours among the scanlines that rays from `widest` mm beside scanline `l` cross
-    /// lose differently, or turn rays differently.
-    fn unlike(&self, l: u32, step: [u32; 2], widest: f64) -> bool {
-        let sent = step.map(|at| self.lines_sent(at.into()).abs());
-        let sent = self.deviations(widest) * sent[0].max(sent[1]);
-        let reach = (widest * self.lines_per_mm(step[0].into())).max(sent).min(1e6).ceil() as u32;
-        let last = (l + reach).min(self.frame.scanlines - 1);
-        (l.saturating_sub(reach)..last).any(|l| {
-            (step[0]..step[1]).any(|band| {
-                let [one, next] = [l, l + 1].map(|l| self.lost_in(l, [band, band + 1]));
-                let [bent, beside] = [l, l + 1].map(|l| self.bent_in(l, [band, band + 1]));
-                let loses = match one.zip(next) {
-                    Some((one, next)) => (one - next).abs() > f64::from(APERTURE_ALIKE),
-                    None => one != next,
-                };
-                loses || (bent - beside).abs() > f64::from(BENT_ALIKE)
-            })
-        })
+    /// Steps and bands in which neighbours differ, among the scanlines that rays from `widest` mm beside scanline `l` to its node
+    /// cross.
+    fn different(&self, l: u32, widest: f64) -> Different {
+        let mut found = Different::default();
+        for step in self.steps() {
+            let sent = step.map(|at| self.lines_sent(at.into()).abs());
+            let sent = self.deviations(widest) * sent[0].max(sent[1]);
+            let received = widest * self.lines_per_mm(step[0].into());
+            let reach = received.max(sent).min(1e6).ceil() as u32;
+            let pairs = l.saturating_sub(reach)..(l + reach).min(self.frame.scanlines - 1);
+            let lose = |band: u32| pairs.clone().any(|l| self.lose_otherwise(l, band));
+            let turn = |band: &u32| pairs.clone().any(|l| self.turn_otherwise(l, *band));
+            found.losses.extend((step[0]..step[1]).any(lose).then_some(step));
+            if self.node.is_multiple_of(LEVEL_STEP) {
+                found.turns.extend((step[0]..step[1]).filter(turn));
+            }
+        }
+        found
+    }
+
+    /// True if scanline `l` and the next lose differently in a band.
+    fn lose_otherwise(&self, l: u32, band: u32) -> bool {
+        let [one, next] = [l, l + 1].map(|l| self.lost_in(l, [band, band + 1]));
+        match one.zip(next) {
+            Some((one, next)) => apart(one, next, APERTURE_ALIKE),
+            None => one != next,
+        }
+    }
+
+    /// True if scanline `l` and the next turn rays differently in a band.
+    fn turn_otherwise(&self, l: u32, band: u32) -> bool {
+        apart(self.bent_in(l, band), self.bent_in(l + 1, band), BENT_ALIKE)
     }
 
     /// For each aperture the mean over its rays of what reaches scanline `l`, over that of its own, nepers of both; and what
@@ -237,9 +251,8 @@ impl Target<'_> {
         let [pitch, _] = line_pitch(frame);
         let widest = halves[0].max(halves[1]);
         let spacing = 2.0 * widest / f64::from(APERTURE_RAYS);
-        let steps: Vec<[u32; 2]> =
-            self.steps().into_iter().filter(|step| self.unlike(l, *step, widest)).collect();
-        if steps.is_empty() {
+        let different = self.different(l, widest);
+        if different.losses.is_empty() && different.turns.is_empty() {
             return Found::default();
         }
         let (mut sums, mut counts) = ([0.0_f64; 2], [0.0_f64; 2]);
@@ -252,7 +265,7 @@ impl Target<'_> {
             if frame.kind != KIND_PHASED && !exists {
                 continue;
             }
-            let ray = self.followed(l, beside, &steps);
+            let ray = self.followed(l, beside, &different);
             let reached = ray.reached;
             rays.push(ray);
             for ((half, sum), count) in halves.iter().zip(&mut sums).zip(&mut counts) {
@@ -265,25 +278,27 @@ impl Target<'_> {
         Found { gain, level: self.level(&rays) }
     }
 
-    /// The ray from `beside` mm beside scanline `l` on the aperture, followed in the steps.
-    fn followed(&self, l: u32, beside: f64, steps: &[[u32; 2]]) -> Ray {
+    /// The ray from `beside` mm beside scanline `l` on the aperture.
+    fn followed(&self, l: u32, beside: f64, different: &Different) -> Ray {
         let (frame, row) = (self.frame, self.row);
-        let band = f64::from(frame.depth) / f64::from(APERTURE_BANDS);
         let from = self.deviations(beside);
         let even = f64::from(row.defocus) * from;
         let (mut more, mut missed, mut aside) = (0.0, 0.0, even);
-        for &step in steps {
+        for &step in &different.losses {
             let [begin, end] = step.map(f64::from);
-            let middle = (begin + end) / 2.0;
-            let other = self.crossed(l, beside, middle);
+            let other = self.crossed(l, beside, (begin + end) / 2.0);
             let losses = self.lost_in(other, step).zip(self.lost_in(l, step));
             let ends = [begin, end].map(|at| self.crossed(l, beside, at));
             more += losses.map_or(0.0, |(there, own)| there - own);
             more += if self.crosses_front(ends, step) { lost_of(0.0) } else { 0.0 };
-            let way = band * (f64::from(self.node) - middle);
-            let own = self.bent_in(l, step);
-            missed += (self.bent_between(l, beside * self.lines_per_mm(middle), step) - own) * way;
-            aside += (self.bent_between(l, from * self.lines_sent(middle), step) - own) * way;
+        }
+        for &band in &different.turns {
+            let middle = f64::from(band) + 0.5;
+            let way = f64::from(frame.depth) / f64::from(APERTURE_BANDS)
+                * (f64::from(self.node) - middle);
+            let own = self.bent_in(l, band);
+            missed += (self.bent_beside(l, beside * self.lines_per_mm(middle), band) - own) * way;
+            aside += (self.bent_beside(l, from * self.lines_sent(middle), band) - own) * way;
         }
         Ray { from, reached: (-more / 2.0).exp(), missed, even, aside }
     }
@@ -312,6 +327,21 @@ impl Target<'_> {
         let floor = |sum: f64| if sum < 1e-30 { 1e-30 } else { sum };
         (0.5 * (floor(met) / floor(even)).ln()).clamp(LEAST_LEVEL.into(), 0.0)
     }
+}
+
+/// True if two numbers are farther apart than what counts as alike, or one of them is none.
+fn apart(one: f64, other: f64, alike: f32) -> bool {
+    let apart = (one - other).abs();
+    apart.is_nan() || apart > f64::from(alike)
+}
+
+/// Steps and bands of the way to a target in which neighbouring scanlines differ.
+#[derive(Default)]
+struct Different {
+    /// Steps, as pairs of nodes, in which they lose differently.
+    losses: Vec<[u32; 2]>,
+    /// Bands in which they turn rays differently.
+    turns: Vec<u32>,
 }
 
 /// A ray from an aperture to a target.

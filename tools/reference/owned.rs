@@ -31,7 +31,7 @@ pub struct Owned {
     pub triangles: Vec<[u32; 3]>,
     /// Displacement fields, in vectors.
     pub fields: Vec<[f32; 3]>,
-    /// What lies on the way to targets ([`World::apertures`]).
+    /// Nodes of depth, [`World::apertures`].
     pub apertures: Vec<Aperture>,
 }
 

@@ -17,9 +17,9 @@ use insonify::sim::layout::{
 };
 
 mod branches;
-mod losses;
+mod passed;
 
-pub use losses::passed;
+pub use passed::passed;
 
 /// The results of `trace`.
 #[derive(Clone, Debug)]
@@ -28,7 +28,7 @@ pub struct Traced {
     pub surface: Accumulator,
     /// Segments per line e * scanlines + l, by path; none is dropped for lack of room.
     pub segments: Vec<Vec<Segment>>,
-    /// What the main paths have passed, by layer, node and scanline; empty where losses do not count by the aperture.
+    /// Nodes of the main paths, by layer, node and scanline; empty where losses do not count by the aperture.
     pub passed: Vec<Passed>,
     /// Counters; `segments_dropped` is the number beyond the frame's capacity.
     pub counters: Counters,
@@ -41,6 +41,8 @@ struct Tracer<'a> {
     ahead: bool,
     /// The next node that a main path reaches.
     node: u32,
+    /// Sine by which rays on it are turned down to the node before.
+    noted: f64,
     out: Traced,
 }
 
@@ -71,6 +73,7 @@ impl<'a> Tracer<'a> {
             probe_from_world: affine(&frame.probe_from_world),
             ahead: false,
             node: 0,
+            noted: 0.0,
             out: Traced {
                 surface: Accumulator::new(frame),
                 segments: vec![Vec::new(); (frame.layers * frame.scanlines) as usize],

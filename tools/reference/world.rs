@@ -57,7 +57,7 @@ pub struct World<'a> {
     pub points: &'a [[f32; 4]],
     /// Displacement fields of deforming instances.
     pub fields: &'a [[f32; 3]],
-    /// What lies on the way to targets, by layer, node and scanline; read where losses count by the aperture.
+    /// Nodes of depth with what lies on the way to targets there, by layer, node and scanline; read where losses count by the aperture.
     pub apertures: &'a [Aperture],
 }
 

@@ -104,10 +104,8 @@ fn a_thin_lens_widens_both_beams_as_gaussian_ones() {
     }
     for power in [-0.01, 0.01] {
         for line in 0..101 {
-            for node in 17..=APERTURE_BANDS {
-                let beside = (f64::from(line) - 50.0) * 0.2;
-                passed[place(&frame, line, node)].bent = power * beside;
-            }
+            let beside = (f64::from(line) - 50.0) * 0.2;
+            passed[place(&frame, line, 17)].bent = power * beside;
         }
         for node in [24, 32, 40] {
             let level = aperture(&frame, &rows, &passed)[place(&frame, 50, node)].level;

@@ -1,4 +1,4 @@
-//! What the main paths pass on their way, and what of the beam is left where its middle is dark.
+//! Nodes of the main paths: what they pass on their way, and what of the beam is left where its middle is dark.
 
 use insonify::sim::layout::{APERTURE_BANDS, HARDLY_PASSED, OTHER_SPEED};
 
@@ -11,7 +11,7 @@ use crate::reference::path::{Path, Role};
 use crate::reference::straight::Start;
 use crate::reference::world::World;
 
-/// What the main paths pass, by layer, node and scanline; nothing where losses do not count by the aperture.
+/// Nodes of the main paths, by layer, node and scanline; nothing where losses do not count by the aperture.
 pub fn passed(world: &World, starts: &[Start]) -> Vec<Passed> {
     let frame = world.frame;
     let lines = frame.layers * frame.scanlines;
@@ -23,6 +23,7 @@ pub fn passed(world: &World, starts: &[Start]) -> Vec<Passed> {
     tracer.ahead = true;
     for line in 0..lines {
         tracer.node = 0;
+        tracer.noted = 0.0;
         let path = tracer.start(line, 0, &starts[line as usize]);
         tracer.follow(path);
     }
@@ -81,7 +82,8 @@ impl Tracer<'_> {
             let followed = rate.filter(|_| way >= 0.0);
             let lost = followed
                 .map_or(UNKNOWN, |rate| (lost_of(path.weight) + rate * way).min(lost_of(0.0)));
-            self.out.passed[at] = Passed { lost, bent: path.bent };
+            self.out.passed[at] = Passed { lost, bent: path.bent - self.noted };
+            self.noted = path.bent;
             self.node += 1;
         }
     }
