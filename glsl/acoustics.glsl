@@ -48,18 +48,23 @@ vec3 power_cosine(vec3 n, float exponent, vec2 u) {
     return normalize(across.x * tangent + across.y * bitangent + cos_t * n);
 }
 
+// True if what comes along d meets the mirror of normal m from the front, and leaves on the near side of the geometric normal.
+bool is_mirror(vec3 d, vec3 m, vec3 n_geometric) {
+    float along = dot(d, m);
+    return along < 0.0 && dot(d - 2.0 * along * m, n_geometric) > 0.0;
+}
+
 // Micro-normal about n whose reflection leaves on the near side of the geometric normal: pdf
 // (s+1)/(2 pi) cos^s. False when eight attempts fail.
 bool rough_normal(vec3 d, vec3 n, vec3 n_geometric, float roughness, uint path, uint key, uint seed, bool sobol, out vec3 m) {
     if (roughness >= SPECULAR) {
         m = n;
-        return dot(d, m) < 0.0 && dot(d - 2.0 * dot(d, m) * m, n_geometric) > 0.0;
+        return is_mirror(d, m, n_geometric);
     }
     for (uint attempt = 0u; attempt < 8u; ++attempt) {
         uvec4 bits = path_draw(path, key, PURPOSE_NORMAL + attempt, seed, sobol);
         m = power_cosine(n, roughness, vec2(unit(bits.x), unit(bits.y)));
-        float along = dot(d, m);
-        if (along < 0.0 && dot(d - 2.0 * along * m, n_geometric) > 0.0) return true;
+        if (is_mirror(d, m, n_geometric)) return true;
     }
     m = n;
     return false;

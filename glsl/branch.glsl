@@ -7,22 +7,26 @@ bool makes_train(inout Path path, inout Interface at, float level) {
     return -dot(path.direction, at.shading) > TRAIN_FACING && level >= TRAIN_FLOOR;
 }
 
-// Makes the reflected part of a main path a branch; true if path n follows it. The paths that follow it are a group until
-// they part.
-bool branch(inout Path path, uint line, uint n, uint key, inout Interface at) {
+// Paths that follow what is reflected off a main path, `least` of them where there are as many.
+uint followers(float reflectance, float least) {
+    float most = float(frame.paths);
+    return uint(min(max(ceil(most * reflectance), least), most));
+}
+
+// Makes the reflected part of a main path a branch; true if path n is among the `wanted` that may follow it, and does. Those
+// are a group until they part.
+bool branch(inout Path path, uint line, uint n, uint key, inout Interface at, out uint wanted) {
     // Russian roulette: the fainter a branch, the more rarely it is followed, with as much more weight.
     float level = path.weight * at.reflectance * rows[row_of(path.time)].compensation;
     path.survival = level < frame.branch_floor ? max(level / frame.branch_floor, LEAST_SURVIVAL) : 1.0;
-    float least = path.survival == 1.0 && makes_train(path, at, level) ? float(TRAIN_PATHS) : 1.0;
-    float most = float(frame.paths);
-    float wanted = min(max(ceil(most * at.reflectance), least), most);
+    wanted = followers(at.reflectance, path.survival == 1.0 && makes_train(path, at, level) ? float(TRAIN_PATHS) : 1.0);
     path.branch = true;
     path.weight *= at.reflectance / path.survival;
     path.probability = path.survival;
-    path.share = 1.0 / wanted;
+    path.share = 1.0 / float(wanted);
     path.first = paths_are_alike() ? 0u : n;
-    path.count = paths_are_alike() ? uint(wanted) : 1u;
-    return float(n) < wanted && unit(line_random(line, n, key, PURPOSE_SURVIVAL).x) < path.survival;
+    path.count = paths_are_alike() ? wanted : 1u;
+    return n < wanted && unit(line_random(line, n, key, PURPOSE_SURVIVAL).x) < path.survival;
 }
 
 // Divides the group of path n at a surface; true if the path is among those that are reflected. Where there are enough

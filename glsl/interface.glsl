@@ -23,12 +23,18 @@ struct Interface {
     uint before; uint behind;       // tissues
 };
 
-// The echo of one path from one interface: a part in phase, and one from behind the surface.
+// What waits of an echo from one interface: a part in phase, and draws from behind the surface.
 struct Echo {
-    uint waiting;                   // bit 0: the part in phase, bit 1: the other
+    uint waiting;           // how many draws, and one for the part in phase
+    uint draw;              // number of the first draw
     uint key;
-    float time; vec2 in_phase;
-    float late; vec2 behind;
+    float time;             // us, at the surface
+    float in_phase;         // amplitude
+    float behind;           // of each draw, at the surface
+    float thickness;        // scale of the draws' depth behind it, mm
+    uint before;            // tissue in front
+    uvec4 cell;             // that their phases belong to
+    bool mean;              // it stands for all paths of the line; then their depths belong to the cell, too
 };
 
 // Share of an echo that the aperture receives of a surface whose small mirrors are spread about the normal n by its
@@ -41,39 +47,106 @@ float received(vec3 d, vec3 n, float roughness, float lobe) {
     return sqrt(mix(exp(-2.0 * lobe * (1.0 - facing * facing) / (1.0 + 8.0 * lobe * diffuse)), 1.0, diffuse));
 }
 
-// m is the sampled micro-normal.
-void make_echo(inout Echo echo, inout Path path, uint line, uint n, inout Interface at, vec3 m) {
+// True if echoes of main paths are the mean over the small mirrors of a surface, and not one mirror for each of their paths.
+bool echoes_in_the_mean() {
+    return role == ROLE_BRANCHES && paths_are_alike() && (frame.flags & FLAG_COHERENT) == 0u;
+}
+
+// Mean over three cosines of incidence about the one of `mirrors`: of the pressure reflected, and of its square.
+vec2 reflected(vec2 mirrors, Medium t1, Medium t2) {
+    vec2 sum = vec2(0.0);
+    // The Gauss-Hermite rule of three points.
+    [[dont_unroll]] for (int i = -1; i <= 1; ++i) {
+        float r = reflection(t1.impedance, t1.speed, t2.impedance, t2.speed, mirrors.x + float(i) * mirrors.y);
+        sum += (i == 0 ? 2.0 / 3.0 : 1.0 / 6.0) * vec2(r, r * r);
+    }
+    return sum;
+}
+
+// Share of the pressure that a surface sends back along the path by the mirror of normal m: of the part in phase, and of each
+// draw from behind. `mean`: by the mean over its mirrors about the normal m, and the root of its mean square.
+vec2 sent_back(vec3 d, vec3 m, inout Interface at, Medium t1, Medium t2, bool mean) {
+    float cos_m = -dot(d, m);
+    vec2 mirrors = vec2(cos_m, 0.0);
+    vec2 share = vec2(0.0);
+    bool lobed = mean && surfaces[at.surface].roughness < SPECULAR;
+    if (lobed) {
+        float along = (1.0 - cos_m) * (float(LOBE_ANGLES - 1u) / LOBE_REACH);
+        // Beyond the last angle as between the last two.
+        uint j = min(uint(whole(floor(along))), LOBE_ANGLES - 2u);
+        vec4 lobe = mix(surfaces[at.surface].lobe[j], surfaces[at.surface].lobe[j + 1u], along - float(j));
+        share = vec2(exp(lobe.x), exp(lobe.y));
+        mirrors = lobe.zw;
+    } else {
+        float facing = 2.0 * cos_m * cos_m - 1.0; // -d . v_r
+        if (facing > 0.0) share = vec2(pow(facing, surfaces[at.surface].specularity));
+    }
+    vec2 r = reflected(mirrors, t1, t2);
+    return share * vec2(r.x, lobed ? sqrt(r.y) : r.x);
+}
+
+// True if the surface sends anything back at all in the mean: it is met from the front.
+bool is_mirrored(vec3 d, inout Interface at) {
+    bool rough = surfaces[at.surface].roughness < SPECULAR;
+    return rough ? dot(d, at.shading) < 0.0 : is_mirror(d, at.shading, at.geometric);
+}
+
+// m is the sampled micro-normal; `arrived` weight, share and probability of the path as it arrived. `mean`: the echo of all
+// paths of the line, m is the normal about which the micro-normals lie.
+void make_echo(inout Echo echo, inout Path path, vec3 arrived, uint line, uint n, inout Interface at, vec3 m, bool mean) {
     float coherence = surfaces[at.surface].coherence;
     Medium t1 = medium_of(at.before), t2 = medium_of(at.behind);
-    float cos_m = -dot(path.direction, m);
-    float r = reflection(t1.impedance, t1.speed, t2.impedance, t2.speed, cos_m);
-    float facing = 2.0 * cos_m * cos_m - 1.0; // -d . v_r
-    if (facing <= 0.0) return;
-    float amplitude = path.weight * r * pow(facing, surfaces[at.surface].specularity)
-        * surfaces[at.surface].gain * beam_weight(off_axis(line, path.origin));
-    uvec4 words = draw(n, echo.key, PURPOSE_THICKNESS);
-    float q = surfaces[at.surface].thickness * abs(gaussian(words.x & 0xffff0000u | words.y >> 16u));
-    float late = path.time + q / t1.speed;
-    float behind = amplitude * exp(-t1.absorption * q);
-    echo.waiting = 1u;
+    vec2 amplitude = arrived.x * surfaces[at.surface].gain * beam_weight(off_axis(line, path.origin))
+        * sent_back(path.direction, m, at, t1, t2, mean);
+    if (amplitude.x == 0.0) return;
+    float share = mean ? 1.0 : arrived.y;
+    echo.time = path.time;
+    echo.draw = n;
+    echo.thickness = surfaces[at.surface].thickness;
+    echo.before = at.before;
+    echo.mean = mean;
+    echo.cell = uvec4(0u);
     if ((frame.flags & FLAG_COHERENT) != 0u) {
-        echo.time = late;
-        echo.in_phase = vec2(path.share * behind, 0.0);
+        echo.waiting = 2u;
+        echo.in_phase = 0.0;
+        echo.behind = share * amplitude.x;
         return;
     }
-    echo.time = path.time;
-    echo.in_phase = vec2(coherence * path.share * amplitude, 0.0);
+    echo.waiting = 1u;
+    echo.in_phase = coherence * share * amplitude.x;
     if (coherence >= 1.0) return;
     // Off the round numbers at which flat faces are modelled: on a cell's border the rounding of a
     // tracer would choose the phase.
     vec3 p = tissue_point(at.instance, path.origin) * 2.0 + 0.381966;
-    uvec3 cell = uvec3(ivec3(floor(p)));
-    vec2 phase = phasor(unit(pcg4d(uvec4(cell, n * 0x9e3779b9u + frame.seed)).w));
-    float incoherent = sqrt((1.0 - coherence * coherence) * path.share * path.probability) * behind
+    // The two faces of a thin sheet are cells of their own.
+    echo.cell = uvec4(ivec3(floor(p)), at.behind * 0x85ebca6bu + frame.seed);
+    float power = mean ? 1.0 / float(LOBE_DRAWS) : arrived.y * arrived.z;
+    echo.behind = sqrt((1.0 - coherence * coherence) * power) * amplitude.y
         * received(path.direction, at.shading, surfaces[at.surface].roughness, rows[row_of(path.time)].lobe);
-    echo.waiting = 3u;
-    echo.late = late;
-    echo.behind = incoherent * phase;
+    echo.waiting += mean ? LOBE_DRAWS : 1u;
+}
+
+// Deposits what waits: the draws, then the part in phase.
+void deposit_echo(inout Echo echo, uint line) {
+    bool split = (frame.flags & FLAG_COHERENT) == 0u;
+    while (echo.waiting != 0u) {
+        echo.waiting -= 1u;
+        bool behind = echo.waiting != 0u;
+        uint n = echo.draw + (behind ? echo.waiting - 1u : 0u);
+        vec2 amplitude = vec2(echo.in_phase, 0.0);
+        float time = echo.time;
+        if (behind) {
+            uvec4 words = draw(n, echo.key, PURPOSE_THICKNESS);
+            uvec4 own = pcg4d(echo.cell + uvec4(0u, 0u, 0u, n * 0x9e3779b9u));
+            float q = echo.thickness * abs(gaussian(echo.mean ? own.x : words.x & 0xffff0000u | words.y >> 16u));
+            Medium before = medium_of(echo.before);
+            time += q / before.speed;
+            vec2 phase = vec2(1.0, 0.0);
+            if (split) phase = phasor(unit(own.w));
+            amplitude = echo.behind * exp(-before.absorption * q) * phase;
+        }
+        deposit_surface(line, time, amplitude, behind && split, line_random(line, n, echo.key, PURPOSE_DITHER));
+    }
 }
 
 // The interface where the path has arrived.

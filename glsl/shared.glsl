@@ -35,6 +35,9 @@ const uint ROLE_BRANCHES = 2u;      // paths echo at the recorded interactions a
 const uint TRACE_GROUP = 64u;        // threads of a work group of paths
 const float LEAST_SURVIVAL = 0.03125; // smallest probability with which a faint branch is followed
 const uint TRAIN_PATHS = 4u;         // least number of paths that follow what may go to and fro between two faces
+const uint LOBE_DRAWS = 4u;          // draws that stand for the part of a main path's echo from behind a rough surface
+const uint LOBE_ANGLES = 32u;        // angles of incidence for which a surface has the mean over its small mirrors
+const float LOBE_REACH = 0.5;        // 1 less the cosine of the last of them; they lie evenly in the cosine
 const float TRAIN_FACING = 0.95;     // cosine between a path and a surface's normal from which on it may
 const float TRAIN_FLOOR = 5e-4;      // amplitude, attenuation made up for, from which on it is followed on every line
 
@@ -148,6 +151,9 @@ struct Tissue {
 struct Surface {
     float roughness; float thickness; float specularity; float gain;  // s, tau mm, n_s, linear
     float coherence; float unused0; float unused1; float unused2;     // gamma = |E exp(ikq)|
+    // Mean over its small mirrors by angle of incidence: nepers of what they send back, of its root mean square; cosine at which
+    // they reflect, and its deviation, sqrt(3) of it.
+    vec4 lobe[LOBE_ANGLES];
 };
 
 struct Instance {

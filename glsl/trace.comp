@@ -95,58 +95,11 @@ uint row_of(float time) {
 #include "emit.glsl"
 #include "interface.glsl"
 #include "branch.glsl"
-
-// Reads the paths of a piece of work; false if there is no such interaction.
-bool take(uint piece, out uint line, out uint next, out uint last, out uint main_path, out uint slot) {
-    uint row = piece % line_count;
-    uint at = piece / line_count;
-    line = line_begin + row;
-    if (role != ROLE_BRANCHES) {
-        next = path_begin + at;
-        last = next + 1u;
-        main_path = row * path_count + at;
-        slot = main_path * frame.max_interactions;
-        return true;
-    }
-    uint slots = path_count * frame.max_interactions;
-    uint blocks_before = at / slots;
-    at -= blocks_before * slots;
-    main_path = row * path_count + at / frame.max_interactions;
-    slot = row * slots + at;
-    if (at % frame.max_interactions >= interaction_count[main_path]) return false;
-    next = interactions[slot].path;
-    last = next + 1u;
-    if (paths_are_alike()) {
-        next = block * blocks_before;
-        last = min(next + block, frame.paths);
-    }
-    return true;
-}
-
-// Takes the next piece of work, `quota` at most; false if there is none.
-bool take_next(inout uint quota, inout uint line, inout uint next, inout uint last, inout uint main_path, inout uint slot) {
-    bool found = false;
-    while (quota > 0u && !found) {
-        quota -= 1u;
-        uint piece = turn == 0u ? atomicAdd(counters.taken_even, 1u) : atomicAdd(counters.taken_odd, 1u);
-        if (piece >= pieces) break;
-        found = take(piece, line, next, last, main_path, slot);
-    }
-    return found;
-}
-
-void deposit_echo(inout Echo echo, uint line, uint n) {
-    while (echo.waiting != 0u) {
-        bool behind = (echo.waiting & 1u) == 0u;
-        echo.waiting &= mix(2u, 0u, behind);
-        deposit_surface(line, mix(echo.time, echo.late, behind), mix(echo.in_phase, echo.behind, bvec2(behind)), behind,
-            line_random(line, n, echo.key, PURPOSE_DITHER));
-    }
-}
+#include "worker.glsl"
 
 // Reflects a path at the transducer's face, a perfect mirror; the part that it sends
 // straight back is an echo.
-void bounce(inout Path path, inout Echo echo, uint line, bool heard) {
+void bounce(inout Path path, inout Echo echo, uint line, uint n, bool heard) {
     vec3 side = world_vector(face_normal(probe_point(path.origin)));
     float cos_face = dot(path.direction, side);
     float retro = path.weight * path.share * beam_weight(off_axis(line, path.origin));
@@ -154,7 +107,9 @@ void bounce(inout Path path, inout Echo echo, uint line, bool heard) {
         echo.waiting = 1u;
         echo.key = path.interactions + 32u * path.reflections;
         echo.time = path.time;
-        echo.in_phase = vec2(retro * max(2.0 * cos_face * cos_face - 1.0, 0.0), 0.0);
+        echo.draw = n;
+        echo.mean = false;
+        echo.in_phase = retro * max(2.0 * cos_face * cos_face - 1.0, 0.0);
     }
     path.left_instance = NONE;
     reflect_path(path, side, SPECULAR, 0.0);
@@ -227,10 +182,11 @@ void main() {
 
     uint guards = 0u, quota = most;
     for (uint guard = 0u;; ++guard) {
-        deposit_echo(echo, line, n);
+        deposit_echo(echo, line);
         bool alive = going && path.interactions < frame.max_interactions && path.crossings < limit
             && (steady ? path.weight > 0.0 : path.weight * path.survival >= frame.min_weight) && path.time < time_end;
         bool recalled = false;
+        bool mean = false;
         Interface at;
         if (!alive || guard == guards) {
             if (next >= last || guard == guards) {
@@ -263,8 +219,10 @@ void main() {
                 continue;
             }
             recall(slot, line, path, at);
+            mean = echoes_in_the_mean();
+            met += mean ? (n == 0u ? frame.paths : 0u) : 1u;
             if (loses_by_aperture() && path.weight < frame.min_weight) {
-                met += 1u;
+                if (mean) last = next;
                 going = false;
                 continue;
             }
@@ -315,7 +273,7 @@ void main() {
                     advance(path, t_end, way, end);
                     path.interactions += 1u;
                     met += 1u;
-                    bounce(path, echo, line, heard);
+                    bounce(path, echo, line, n, heard);
                     continue;
                 }
                 close = clearance(here.position);
@@ -380,20 +338,28 @@ void main() {
 
         bool rough_through = (frame.flags & FLAG_ROUGH_TRANSMISSION) != 0u;
         uint key = path.interactions + 32u * path.reflections;
+        vec3 arrived = vec3(path.weight, path.share, path.probability);
+        bool follows = true;
+        if (recalled) {
+            uint wanted;
+            follows = branch(path, line, n, key, at, wanted);
+            if (mean) last = min(last, max(wanted, next));
+        }
         vec3 m = at.shading;
         bool rough = false;
-        if (role != ROLE_MAIN || rough_through) {
+        if (role == ROLE_MAIN ? rough_through : !mean || follows) {
             rough = rough_normal(path.direction, at.shading, at.geometric, surfaces[at.surface].roughness, n, key,
                 frame.seed, (frame.flags & FLAG_SOBOL) != 0u, m);
         }
         bool reflects = false;
         if (role != ROLE_MAIN) {
-            met += 1u;
+            if (!recalled) met += 1u;
             echo.key = key;
-            if (rough) make_echo(echo, path, line, n, at, m);
+            bool echoes = mean ? n == 0u && is_mirrored(path.direction, at) : rough;
+            if (echoes) make_echo(echo, path, arrived, line, n, at, mix(m, at.shading, bvec3(mean)), mean);
             bool can_reflect = rough && path.reflections < frame.max_reflections;
             if (recalled) {
-                reflects = branch(path, line, n, key, at) && can_reflect;
+                reflects = follows && can_reflect;
                 going = reflects;
             } else {
                 reflects = path.branch ? parts(path, line, n, key, at) : choose(path, n, key, at.reflectance);

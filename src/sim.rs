@@ -14,6 +14,7 @@ pub mod labels;
 mod lane;
 pub mod layout;
 mod line;
+pub mod lobe;
 pub mod memory;
 pub mod pass;
 mod passes;

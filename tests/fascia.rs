@@ -41,16 +41,22 @@ fn sheet(angle: f64, more: &str) -> Scene {
     Scene::load(&path, &[]).expect("sound").0
 }
 
+/// Seeds over which the power of echoes is averaged: the phases of the sheet's cells are theirs.
+const SEEDS: u32 = 24;
+
 /// Power of the echoes of the sheet, per scanline, dB.
 fn power(angle: f64, more: &str) -> f64 {
-    let scene = sheet(angle, more);
+    let mut scene = sheet(angle, more);
     let mut simulator =
         Simulator::new(&test_device(), &Library::embedded(), &scene, Tracer::Bvh).expect("made");
-    simulator.frame(&scene, 0).expect("a frame");
-    let iq = simulator.iq().expect("samples");
-    let samples = scene.probe.samples as usize;
-    let sum: f32 = iq[2 * 32 * samples..2 * 96 * samples].iter().map(|v| v * v).sum();
-    10.0 * f64::from(sum).log10()
+    let mut of_seed = |seed| {
+        scene.simulation.seed = seed;
+        simulator.frame(&scene, 0).expect("a frame");
+        let iq = simulator.iq().expect("samples");
+        let samples = scene.probe.samples as usize;
+        iq[2 * 32 * samples..2 * 96 * samples].iter().map(|v| f64::from(v * v)).sum::<f64>()
+    };
+    10.0 * (1..=SEEDS).map(&mut of_seed).sum::<f64>().log10()
 }
 
 /// Levels of a sheet tilted by these angles below that of one that faces the beam, dB.
@@ -59,23 +65,31 @@ fn fallen(angles: [f64; 4], more: &str) -> [f64; 4] {
     angles.map(|angle| power(angle, more) - facing)
 }
 
-/// Level of a sheet of tissue's own roughness, tilted by `angle`, below that of one that faces the beam, dB: the overlap of
-/// what it reflects of the transmit aperture with the receive aperture; and, since the phase is the same over 0.5 mm of the
-/// sheet, what the beam's width adds up of that.
+/// Level of a sheet of tissue's own roughness, tilted by `angle`, below that of one that faces the beam, dB: of either face,
+/// the overlap of what it reflects of the transmit aperture with the receive aperture, and what its small mirrors send back;
+/// and, since the phase is the same over 0.5 mm of the sheet, what the beam adds up of the scanlines that meet it there.
 fn closed_form(angle: f64) -> f64 {
     let scene = sheet(0.0, "");
-    let (lobe, sigma) = (scene.probe.lobe(22.0), scene.probe.sigma_lateral(22.0));
-    let diffuse = 2.0 / (scene.instances[0].surface[0].roughness + 2.0);
-    let sine = (2.0 * angle).sin();
-    let energy = (-2.0 * lobe * sine * sine / (1.0 + 8.0 * lobe * diffuse)).exp();
-    let received = energy + diffuse * (1.0 - energy);
-    let speed = scene.tissues[scene.background].speed;
-    let turns = 2.0 * std::f64::consts::TAU * scene.probe.frequency / speed;
+    let probe = &scene.probe;
+    let (lobe, sigma, pitch) =
+        (probe.lobe(22.0), probe.sigma_lateral(22.0), probe.line_pitch(22.0));
+    let speed_of = |i: usize| scene.tissues[i].speed;
+    let [speed, within] = [scene.background, scene.instances[0].tissue].map(speed_of);
+    let surface = &scene.instances[0].surface[0];
+    let diffuse = 2.0 / (surface.roughness + 2.0);
+    let face = |angle: f64| {
+        let (sine, cosine) = (2.0 * angle).sin_cos();
+        let energy = (-2.0 * lobe * sine * sine / (1.0 + 8.0 * lobe * diffuse)).exp();
+        (energy + diffuse * (1.0 - energy)) * cosine.powf(2.0 * surface.specularity)
+    };
+    // Behind the face in front the path is refracted.
+    let received = 0.5 * (face(angle) + face((angle.sin() * within / speed).asin()));
+    let turns = 2.0 * std::f64::consts::TAU * probe.frequency / speed;
     let added = |angle: f64| -> f64 {
         let cell = 0.5 * angle.cos();
-        let at = |i: u32| (f64::from(i) + 0.5) / 1000.0 * cell;
-        let pair = |u: f64| (1.0 - u / cell) * (-u * u / (4.0 * sigma * sigma)).exp();
-        (0..1000).map(at).map(|u| pair(u) * (turns * angle.tan() * u).cos()).sum::<f64>() * cell
+        let pair = |u: f64| (1.0 - u / cell).max(0.0) * (-u * u / (4.0 * sigma * sigma)).exp();
+        let apart = (1..=8).map(|i| f64::from(i) * pitch);
+        1.0 + 2.0 * apart.map(|u| pair(u) * (turns * angle.tan() * u).cos()).sum::<f64>()
     };
     10.0 * (received * added(angle) / added(0.0)).log10()
 }
@@ -90,7 +104,7 @@ fn a_tilted_fascia_fades_as_it_leaves_the_aperture() {
     assert!(found[2] < -10.0 && found[3] < -20.0, "{found:?}");
     for (angle, found) in angles.iter().zip(found).take(3) {
         let expected = closed_form(angle.to_radians());
-        assert!((found - expected).abs() < 0.8, "{angle} degrees: {found} dB, {expected}");
+        assert!((found - expected).abs() < 0.6, "{angle} degrees: {found} dB, {expected}");
     }
     // An aperture twice as wide still sees what is tilted by 10 degrees.
     let wide = fallen(angles, "f_number_receive = 1\nf_number_transmit = 1");

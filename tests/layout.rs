@@ -177,17 +177,18 @@ fn every_constant_has_the_value_of_its_mirror() {
 fn a_planted_mismatch_is_noticed() {
     let shader = named();
     let (structure, stride) = shader.iter().find(|(s, _)| s.name() == Some("Surface")).unwrap();
+    let size = size_of::<Surface>();
     let planted =
         |offsets, size| difference(structure, *stride, &Mirror { name: "Surface", size, offsets });
     let mut fields = Surface::OFFSETS.to_vec();
     fields.swap(1, 2);
-    assert!(planted(fields.leak(), 32).is_some(), "two fields swapped");
+    assert!(planted(fields.leak(), size).is_some(), "two fields swapped");
     let mut fields = Surface::OFFSETS.to_vec();
     fields[3].1 += 4;
-    assert!(planted(fields.leak(), 32).is_some(), "a field moved");
-    assert!(planted(&Surface::OFFSETS[..7], 32).is_some(), "a field missing");
-    assert!(planted(Surface::OFFSETS, 48).is_some(), "another size");
-    assert!(planted(Surface::OFFSETS, 32).is_none());
+    assert!(planted(fields.leak(), size).is_some(), "a field moved");
+    assert!(planted(&Surface::OFFSETS[..8], size).is_some(), "a field missing");
+    assert!(planted(Surface::OFFSETS, size + 16).is_some(), "another size");
+    assert!(planted(Surface::OFFSETS, size).is_none());
 }
 
 /// Optimisation strips the names, but a kernel that lays out a shared structure differently (`std140`, `scalar`,

@@ -115,6 +115,12 @@ constants! {
     pub const LEAST_SURVIVAL: f32 = 1.0 / 32.0;
     /// Least number of paths that follow what may go to and fro between two faces.
     pub const TRAIN_PATHS: u32 = 4;
+    /// Draws that stand for the part of a main path's echo that comes from behind a rough surface, whatever the number of paths.
+    pub const LOBE_DRAWS: u32 = 4;
+    /// Angles of incidence for which a surface has the mean over its small mirrors.
+    pub const LOBE_ANGLES: usize = 32;
+    /// 1 less the cosine of the last of them; they lie evenly in the cosine.
+    pub const LOBE_REACH: f32 = 0.5;
     /// Cosine between a path and a surface's normal from which on what is reflected may go to and fro.
     pub const TRAIN_FACING: f32 = 0.95;
     /// Amplitude, attenuation made up for, from which on a train of echoes is followed on every line.
@@ -262,6 +268,7 @@ shared! {
     struct Surface {
         roughness: f32, thickness: f32, specularity: f32, gain: f32,
         coherence: f32, unused0: f32, unused1: f32, unused2: f32,
+        lobe: [[f32; 4]; LOBE_ANGLES],
     }
     /// A placed mesh.
     struct Instance {

@@ -3,6 +3,7 @@
 use super::calibration::{Calibration, ELEVATION_CUT, amplitude};
 use super::contact::reach;
 use super::layout;
+use super::lobe::{Lobes, MIRROR};
 use super::placement::matrix_rows;
 use super::special::half_normal_coherence;
 use crate::probe::{Kind, Probe};
@@ -16,8 +17,6 @@ use crate::settings::{
 const LEAST_WEIGHT: f32 = 1e-30;
 /// Level of an amplitude twice as large, dB.
 const DECIBEL_PER_OCTAVE: f64 = 6.020_599_913;
-/// Roughness from which on a surface is a perfect mirror.
-const MIRROR: f64 = 1e9;
 
 /// The value, or 0 for infinity: kernels read 0 as "none" and do not compute with infinity.
 fn finite_or_zero(x: f64) -> f32 {
@@ -298,17 +297,22 @@ pub(super) fn tissue_seed(seed: u32, index: usize) -> u32 {
 pub fn surfaces(scene: &Scene) -> Vec<layout::Surface> {
     let (phase, simulation) = (scene.probe.phase_per_mm(), &scene.simulation);
     let thickness = |surface: &Surface| surface.thickness * simulation.thickness_scale;
+    let mut lobes = Lobes::default();
     scene
         .instances
         .iter()
         .flat_map(|instance| instance.surface)
-        .map(|surface| layout::Surface {
-            roughness: (surface.roughness * simulation.roughness_scale).min(MIRROR) as f32,
-            thickness: thickness(&surface) as f32,
-            specularity: surface.specularity as f32,
-            gain: amplitude(surface.gain) as f32,
-            coherence: half_normal_coherence(phase, thickness(&surface)) as f32,
-            ..layout::Surface::default()
+        .map(|surface| {
+            let roughness = (surface.roughness * simulation.roughness_scale).min(MIRROR);
+            layout::Surface {
+                roughness: roughness as f32,
+                thickness: thickness(&surface) as f32,
+                specularity: surface.specularity as f32,
+                gain: amplitude(surface.gain) as f32,
+                coherence: half_normal_coherence(phase, thickness(&surface)) as f32,
+                lobe: lobes.of(roughness, surface.specularity),
+                ..layout::Surface::default()
+            }
         })
         .collect()
 }

@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use glam::{DAffine3, DVec3};
 use insonify::scene::Scene;
-use insonify::settings::Coherence;
+use insonify::settings::{Coherence, Sampling};
 use insonify::sim::Tracer;
 
 use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};
@@ -101,6 +101,8 @@ fn delays(bench: &Bench, physics: Physics) -> Outcome {
         for tracer in TRACERS {
             // Scanlines 8 mm apart: no two share a cell of the phase, nor a beam.
             let mut scene = wall(128, 8.0, speed, thicker(physics, tau));
+            // Each path echoes: there are as many depths as paths.
+            scene.simulation.sampling = Sampling::Plain;
             scene.simulation.paths = 512;
             let mut range = Range::new(bench, &scene, tracer);
             let powers: Vec<Vec<f64>> = (1..=SEEDS)

@@ -11,6 +11,7 @@ use insonify::scene::{Mesh, shapes};
 use insonify::sim::bvh::{BvhInstance, MeshBvh, SceneBvh};
 use insonify::sim::fields::{HEADER, padded};
 use insonify::sim::layout::{Frame, Instance, NONE, Surface, Tissue};
+use insonify::sim::lobe::Lobes;
 use insonify::sim::placement;
 
 /// The tables and instances of one world.
@@ -173,6 +174,7 @@ pub fn surfaces() -> Vec<Surface> {
             specularity: 3.0,
             gain: 1.5,
             coherence: 0.6,
+            lobe: Lobes::default().of(60.0, 3.0),
             ..Surface::default()
         },
         Surface {

@@ -1,5 +1,7 @@
 //! Arrival of a path at a surface: normals, reflectance and echo.
 
+use std::ops::Range;
+
 use glam::DVec3;
 
 use super::Accumulator;
@@ -11,11 +13,11 @@ use super::stack::Stack;
 use super::wavefront::{Slope, turned};
 use super::world::{Crossing, World};
 use insonify::sim::layout::{
-    BENDING_ANGLE, BENDING_STEP, FLAG_COHERENT, LEAST_PITCH, Row, Surface, Tissue,
+    BENDING_ANGLE, BENDING_STEP, FLAG_COHERENT, LEAST_PITCH, LOBE_ANGLES, LOBE_DRAWS, LOBE_REACH,
+    Row, Surface, Tissue,
 };
+pub(super) use insonify::sim::lobe::MIRROR;
 
-/// Roughness exponent from which on a surface is a perfect mirror.
-pub(super) const MIRROR: f64 = 1e9;
 /// Edge of the cells that share the random phase of a thick surface's echo, mm.
 const PHASE_CELL: f64 = 0.5;
 /// Shift of these cells, in their edge, away from the round numbers at which faces are modelled.
@@ -57,6 +59,8 @@ pub(super) struct Interface {
     surface: Surface,
     absorption: f64,
     instance: u32,
+    /// Tissue behind it.
+    behind: u32,
 }
 
 fn fluid(tissue: &Tissue) -> Fluid {
@@ -74,9 +78,9 @@ pub(super) fn meet(
 ) -> Interface {
     let d = path.direction;
     let Slope { geometric, shading, refracting, turning, ray, width } = world.slope(row, path, hit);
-    let tissue = |stack| &world.tissues[world.medium(stack).0 as usize];
-    let (before, behind) = (tissue(&path.stack), tissue(after));
-    let fluids = [fluid(before), fluid(behind)];
+    let behind = world.medium(after).0;
+    let before = &world.tissues[world.medium(&path.stack).0 as usize];
+    let fluids = [fluid(before), fluid(&world.tissues[behind as usize])];
     let instance = &world.instances[hit.instance as usize];
     let surface = world.surfaces
         [if hit.entry { instance.surface_outside } else { instance.surface_inside } as usize];
@@ -97,6 +101,7 @@ pub(super) fn meet(
         surface,
         absorption: before.absorption.into(),
         instance: hit.instance,
+        behind,
     }
 }
 
@@ -196,40 +201,105 @@ impl Interface {
         (energy + diffuse * (1.0 - energy)).sqrt()
     }
 
-    /// Deposits the echo that returns along the path: the part in phase at the surface, the rest displaced
-    /// by the thickness with a phase that belongs to the surface.
+    /// Share of the pressure that the path's small mirror sends straight back.
+    fn sent_back(&self, d: DVec3) -> Option<f64> {
+        let Micro { normal, reflected } = self.micro?;
+        let facing = (-d.dot(reflected)).max(0.0);
+        let r = reflection(self.fluids[0], self.fluids[1], -d.dot(normal));
+        (facing > 0.0).then(|| r * facing.powf(self.surface.specularity.into()))
+    }
+
+    /// The same of all mirrors about the normal: the mean, and the root of the mean square.
+    fn sent_back_in_the_mean(&self, d: DVec3) -> Option<[f64; 2]> {
+        let cosine = -d.dot(self.shading);
+        let [before, behind] = self.fluids;
+        if self.roughness >= MIRROR {
+            let reflected = mirror(d, self.shading);
+            let facing = -d.dot(reflected);
+            let sent = cosine > 0.0 && facing > 0.0 && reflected.dot(self.geometric) > 0.0;
+            let share = reflection(before, behind, cosine)
+                * facing.max(0.0).powf(self.surface.specularity.into());
+            return sent.then_some([share; 2]);
+        }
+        let along = (1.0 - cosine) * (LOBE_ANGLES - 1) as f64 / f64::from(LOBE_REACH);
+        // Beyond the last angle as between the last two.
+        let j = (along.max(0.0) as usize).min(LOBE_ANGLES - 2);
+        let [above, below] = [j, j + 1].map(|j| self.surface.lobe[j].map(f64::from));
+        let at = |i: usize| above[i] + (along - j as f64) * (below[i] - above[i]);
+        let pressures = [-1.0, 0.0, 1.0].map(|i| reflection(before, behind, at(2) + i * at(3)));
+        // The Gauss-Hermite rule of three points.
+        let mean = |[a, b, c]: [f64; 3]| (a + 4.0 * b + c) / 6.0;
+        let square = mean(pressures.map(|r| r * r));
+        (cosine > 0.0).then(|| [at(0).exp() * mean(pressures), at(1).exp() * square.sqrt()])
+    }
+
+    /// Deposits the echo of one path that returns along it.
     pub(super) fn echo(&self, world: &World, path: &Path, out: &mut Accumulator) {
-        let Some(micro) = self.micro else { return };
-        let frame = world.frame;
-        let (surface, d) = (&self.surface, path.direction);
-        let r = reflection(self.fluids[0], self.fluids[1], -d.dot(micro.normal));
-        let lobe = (-d.dot(micro.reflected)).max(0.0).powf(surface.specularity.into());
-        let amplitude = path.weight * r * lobe * f64::from(surface.gain) * path.beam_weight(frame);
-        let words = draw(frame, path.n, path.key(), PURPOSE_THICKNESS);
-        let q =
-            f64::from(surface.thickness) * gaussian(words[0] & 0xffff_0000 | words[1] >> 16).abs();
-        let behind = amplitude * (-self.absorption * q).exp();
-        let time = path.time + q / self.fluids[0].speed;
+        if let Some(sent) = self.sent_back(path.direction) {
+            let shares = [path.share, path.share * path.probability];
+            self.deposit(world, path, [sent; 2], shares, path.n..path.n + 1, out);
+        }
+    }
+
+    /// Deposits the echo of all paths of a line, of which `path` is one.
+    pub(super) fn mean_echo(&self, world: &World, path: &Path, out: &mut Accumulator) {
+        if let Some(sent) = self.sent_back_in_the_mean(path.direction) {
+            let shares = [1.0, 1.0 / f64::from(LOBE_DRAWS)];
+            self.deposit(world, path, sent, shares, 0..LOBE_DRAWS, out);
+        }
+    }
+
+    /// Deposits the part in phase at the surface, by its share of the amplitude, and the rest, in draws by their share of the
+    /// power each, displaced by the thickness and with phases that belong to the surface.
+    fn deposit(
+        &self,
+        world: &World,
+        path: &Path,
+        [in_phase, from_behind]: [f64; 2],
+        [share, power]: [f64; 2],
+        draws: Range<u32>,
+        out: &mut Accumulator,
+    ) {
+        let (frame, surface) = (world.frame, &self.surface);
+        let amplitude = path.weight * f64::from(surface.gain) * path.beam_weight(frame);
         let (l, _) = path.scanline(frame.scanlines);
         let gain = gain(world, path);
-        let dither = path.dither(frame);
-        if frame.flags & FLAG_COHERENT != 0 {
-            out.deposit(l, time, path.share * behind, 0.0, &gain, dither);
-            return;
-        }
+        let split = frame.flags & FLAG_COHERENT == 0;
         let coherence = if surface.thickness == 0.0 { 1.0 } else { f64::from(surface.coherence) };
-        out.deposit(l, path.time, coherence * path.share * amplitude, 0.0, &gain, dither);
         let rest = (1.0 - coherence * coherence).max(0.0).sqrt();
-        if rest > 0.0 {
-            let p = world.tissue_point(self.instance, path.origin);
-            let cell = (p / PHASE_CELL + PHASE_SHIFT).floor().as_i64vec3();
-            let key = path.n.wrapping_mul(0x9e37_79b9).wrapping_add(frame.seed);
-            let words = pcg4d([cell.x as u32, cell.y as u32, cell.z as u32, key]);
-            let phase = std::f64::consts::TAU * unit(words[3]);
-            let lobe = f64::from(world.rows[out.sample(path.time)].lobe);
-            let scale = rest * (path.share * path.probability).sqrt() * self.received(d, lobe);
-            let incoherent = |k: usize| gain(k) * f64::from(world.rows[k].incoherent_gain);
-            out.deposit(l, time, scale * behind, phase, incoherent, dither);
+        if split {
+            let in_phase = coherence * share * in_phase * amplitude;
+            let dither = path.dither(frame, draws.start);
+            out.deposit(l, path.time, in_phase, 0.0, &gain, dither);
+            if rest == 0.0 {
+                return;
+            }
+        }
+        let p = world.tissue_point(self.instance, path.origin);
+        let cell = (p / PHASE_CELL + PHASE_SHIFT).floor().as_i64vec3();
+        let lobe = f64::from(world.rows[out.sample(path.time)].lobe);
+        let scale = rest * power.sqrt() * self.received(path.direction, lobe);
+        let mean = draws.len() > 1;
+        for n in draws {
+            // The two faces of a thin sheet are cells of their own.
+            let face = self.behind.wrapping_mul(0x85eb_ca6b);
+            let key = n.wrapping_mul(0x9e37_79b9).wrapping_add(face).wrapping_add(frame.seed);
+            let own = pcg4d([cell.x as u32, cell.y as u32, cell.z as u32, key]);
+            let words = draw(frame, n, path.key(), PURPOSE_THICKNESS);
+            let bits = if mean { own[0] } else { words[0] & 0xffff_0000 | words[1] >> 16 };
+            let q = f64::from(surface.thickness) * gaussian(bits).abs();
+            let behind = from_behind * amplitude * (-self.absorption * q).exp();
+            let (time, dither) = (path.time + q / self.fluids[0].speed, path.dither(frame, n));
+            if split {
+                let incoherent = |k: usize| gain(k) * f64::from(world.rows[k].incoherent_gain);
+                let phase = std::f64::consts::TAU * unit(own[3]);
+                out.deposit(l, time, scale * behind, phase, incoherent, dither);
+            } else {
+                out.deposit(l, time, share * behind, 0.0, &gain, dither);
+            }
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -79,9 +79,9 @@ impl Path {
         beam_weight(frame, (self.origin - line.origin).dot(line.lateral))
     }
 
-    /// The numbers added before rounding down: for each sample of a deposit, real and imaginary part.
-    pub(super) fn dither(&self, frame: &Frame) -> [f64; 8] {
-        let words = self.line_random(frame, self.n, PURPOSE_DITHER);
+    /// The numbers added before rounding down of draw `n`: for each sample of a deposit, real and imaginary part.
+    pub(super) fn dither(&self, frame: &Frame, n: u32) -> [f64; 8] {
+        let words = self.line_random(frame, n, PURPOSE_DITHER);
         std::array::from_fn(|i| {
             let word = words[i / 2];
             let half = if i % 2 == 0 { word >> 16 } else { word & 0xffff };

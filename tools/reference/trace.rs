@@ -12,8 +12,9 @@ use super::straight::{Start, Toggled};
 use super::world::{World, affine};
 use super::{Accumulator, Segment, acoustics};
 use insonify::sim::layout::{
-    Counters, FLAG_FACE_REFLECTION, FLAG_ROUGH_TRANSMISSION, FLAG_WAVEFRONT, Frame, LEAST_MAIN,
-    LEAST_PASSED, LEAST_PITCH, SAMPLING_MAIN_PATH, SAMPLING_SHARED_PRIMARY, STRIP_LIMIT,
+    Counters, FLAG_COHERENT, FLAG_FACE_REFLECTION, FLAG_ROUGH_TRANSMISSION, FLAG_WAVEFRONT, Frame,
+    LEAST_MAIN, LEAST_PASSED, LEAST_PITCH, SAMPLING_MAIN_PATH, SAMPLING_SHARED_PRIMARY,
+    STRIP_LIMIT,
 };
 
 mod branches;
@@ -197,7 +198,7 @@ impl<'a> Tracer<'a> {
                     && (whole.weight < f64::from(frame.min_weight)
                         || path.shadowed && self.is_hidden(&path, &interface));
                 if !self.ahead && !faint {
-                    interface.echo(self.world, &whole, &mut self.out.surface);
+                    self.echo(&whole, &interface);
                 }
                 let goes_on = match path.role {
                     Role::Main if self.is_steady(&path) => {
@@ -231,6 +232,18 @@ impl<'a> Tracer<'a> {
             }
         }
         self.lose_no_more(&path);
+    }
+
+    /// Deposits what `interface` sends straight back of `path`; the first path of a line speaks for all where they are alike.
+    fn echo(&mut self, path: &Path, interface: &Interface) {
+        let frame = self.world.frame;
+        let mean = path.role == Role::Main && are_alike(frame) && frame.flags & FLAG_COHERENT == 0;
+        let out = &mut self.out.surface;
+        match mean {
+            true if path.n == 0 => interface.mean_echo(self.world, path, out),
+            true => (),
+            false => interface.echo(self.world, path, out),
+        }
     }
 
     /// True if the path gives no more echoes: it is outside of all masks, and neither a mask nor
@@ -283,7 +296,7 @@ impl<'a> Tracer<'a> {
             let amplitude = path.share * path.weight * lobe * path.beam_weight(self.world.frame);
             let gain = interface::gain(self.world, path);
             let (l, _) = path.scanline(self.world.frame.scanlines);
-            let dither = path.dither(self.world.frame);
+            let dither = path.dither(self.world.frame, path.n);
             let surface = &mut self.out.surface;
             surface.deposit(l, path.time, amplitude, 0.0, gain, dither);
         }
