@@ -112,9 +112,10 @@ impl App {
     /// Another simulation on a new device, with what there is to say of it.
     fn restart(&mut self, events: &ActiveEventLoop, problem: Option<String>) {
         if let Some(open) = self.open.take() {
-            self.lost = Some(Instant::now());
             let opened = open.again(&self.plan, problem);
             self.adopt(events, opened.map_err(lost_again));
+            // From when it is open: how long that takes is the machine's affair.
+            self.lost = Some(Instant::now());
         }
     }
 

@@ -351,9 +351,15 @@ impl Desk {
     }
 
     /// Waits until the program has ended by itself.
-    pub fn ended(mut self) -> ExitStatus {
+    pub fn ended(self) -> ExitStatus {
+        self.ended_by(|| ())
+    }
+
+    /// Does something again and again until the program has ended by it.
+    pub fn ended_by(mut self, act: impl Fn()) -> ExitStatus {
         let began = Instant::now();
         loop {
+            act();
             if let Some(status) = self.program.try_wait().expect("a child") {
                 return status;
             }
