@@ -211,16 +211,11 @@ impl Interface {
 
     /// The same of all mirrors about the normal: the mean, and the root of the mean square.
     fn sent_back_in_the_mean(&self, d: DVec3) -> Option<[f64; 2]> {
+        if self.roughness >= MIRROR {
+            return self.sent_back(d).map(|sent| [sent; 2]);
+        }
         let cosine = -d.dot(self.shading);
         let [before, behind] = self.fluids;
-        if self.roughness >= MIRROR {
-            let reflected = mirror(d, self.shading);
-            let facing = -d.dot(reflected);
-            let sent = cosine > 0.0 && facing > 0.0 && reflected.dot(self.geometric) > 0.0;
-            let share = reflection(before, behind, cosine)
-                * facing.max(0.0).powf(self.surface.specularity.into());
-            return sent.then_some([share; 2]);
-        }
         let along = (1.0 - cosine) * (LOBE_ANGLES - 1) as f64 / f64::from(LOBE_REACH);
         // Beyond the last angle as between the last two.
         let j = (along.max(0.0) as usize).min(LOBE_ANGLES - 2);

@@ -11,7 +11,8 @@ fn inclined(roughness: f64, specularity: f64, degrees: f64, fluids: [[f64; 2]; 2
         refracting: normal,
         turning: DVec3::ZERO,
         ray: normal,
-        micro: None,
+        // Of a mirror; what is drawn of a lobe has others.
+        micro: Some(Micro { normal, reflected: mirror(-DVec3::Z, normal) }),
         fluids: fluids.map(|[speed, impedance]| Fluid { speed, impedance }),
         reflectance: 0.0,
         curved: false,
