@@ -1,9 +1,6 @@
 //! Tracked sweeps of known geometry: places of points in the volume, preservation of speckle, poses
 //! read back, and the command.
 
-#[path = "common/program.rs"]
-mod program;
-
 use std::sync::LazyLock;
 
 use glam::{DAffine3, DVec3};
@@ -14,7 +11,8 @@ use insonify::scene::file::load_trajectory;
 use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer};
 use insonify::volume::{Fan, Sequence, Settings, Transforms, Volume, reconstruct};
-use program::insonify;
+
+use crate::common::program::insonify;
 
 /// Points in the world, mm: separated in every direction, none in the middle.
 const POINTS: [[f64; 3]; 4] =

@@ -1,11 +1,6 @@
 //! Whole frames of scenes that move: every strategy shows the same image of the same instant, by both
 //! tracers, also when it is exchanged while frames are in flight.
 
-#[path = "common/skip.rs"]
-mod skip;
-#[path = "common/tracers.rs"]
-mod tracers;
-
 use std::path::Path;
 
 use insonify::gpu::test_device;
@@ -13,7 +8,8 @@ use insonify::scene::{Scene, Strategy};
 use insonify::settings::{Refraction, TextureSpace, Words};
 use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer};
-use tracers::tracers;
+
+use crate::common::tracers::tracers;
 
 /// A shipped scene at a size that a software driver renders in a second.
 fn small(name: &str) -> Scene {

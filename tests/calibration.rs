@@ -1,9 +1,6 @@
 //! Levels by brute force: lattices of random scatterers, summed in f64 with the numbers that the kernels
 //! read, must have the brightness that the tables promise.
 
-#[path = "common/signal.rs"]
-mod signal;
-
 use std::f64::consts::SQRT_2;
 
 use glam::DAffine3;
@@ -12,7 +9,8 @@ use insonify::scene::{Instance, Keyframes, Scene, Surface, Tissue, Wire};
 use insonify::settings::ScatterMode;
 use insonify::sim::calibration::{Calibration, amplitude, lateral_taps};
 use insonify::sim::{layout, tables};
-use signal::{Random, scene, tissue};
+
+use crate::common::signal::{Random, scene, tissue};
 
 /// Response of sample `k` to a unit echo at index `kappa`: the nearest sample, then the axial kernel.
 fn axial(frame: &layout::Frame, k: f64, kappa: f64) -> f64 {

@@ -1,20 +1,14 @@
 //! The command line as a user sees it: files written, figures reported, mistakes explained.
 
-#[path = "common/skip.rs"]
-mod skip;
-#[path = "common/timestamps.rs"]
-mod timestamps;
-#[path = "common/tracers.rs"]
-mod tracers;
-
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
 use insonify::gpu::test_device;
 use insonify::sim::stages;
 use serde_json::Value;
-use timestamps::timestamps;
-use tracers::tracers;
+
+use crate::common::timestamps::timestamps;
+use crate::common::tracers::tracers;
 
 /// A small frame, so that a software driver takes well under a second.
 const SMALL: [&str; 6] = [

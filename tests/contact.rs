@@ -1,11 +1,6 @@
 //! Elements that do not touch the skin neither send nor receive: closed forms of which elements these are, and of
 //! the remaining brightness of a scanline, by both tracers.
 
-#[path = "common/skip.rs"]
-mod skip;
-#[path = "common/tracers.rs"]
-mod tracers;
-
 use std::path::Path;
 use std::sync::Arc;
 
@@ -15,7 +10,8 @@ use insonify::scene::Scene;
 use insonify::sim::contact::{Coupling, Skins, table};
 use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer};
-use tracers::tracers;
+
+use crate::common::tracers::tracers;
 
 /// Scatterers everywhere, no noise, a linear probe of 38 mm and 96 scanlines.
 const BENCH: &str = r#"

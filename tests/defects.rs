@@ -1,17 +1,15 @@
 //! Files and scenes that once took memory or time without bound, were misread in silence, or were refused with a
 //! word about something else.
 
-#[path = "common/limited.rs"]
-#[allow(dead_code, reason = "only single files")]
-mod limited;
-
 use std::fs;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use limited::{Outcome, check};
 use tempfile::TempDir;
+
+use crate::common::limited;
+use crate::common::limited::{Outcome, check};
 
 /// A folder for the files of a test.
 fn folder() -> TempDir {

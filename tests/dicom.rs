@@ -1,19 +1,15 @@
 //! DICOM files that are cut, changed or hostile, and those of scanners that are no volumes. The content of
 //! sound files is compared in tests/volumes.rs.
 
-#[path = "common/limited.rs"]
-mod limited;
-#[path = "common/shared_data.rs"]
-mod shared_data;
-
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use flate2::Compression;
 use flate2::write::DeflateEncoder;
 use insonify::volume::{Volume, Voxels};
-use limited::{Outcome, check, files};
-use shared_data::shared_data;
+
+use crate::common::limited::{Outcome, check, files};
+use crate::common::shared_data::shared_data;
 
 fn shipped() -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/volumes");

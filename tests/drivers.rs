@@ -1,14 +1,12 @@
 //! Comparison of two Vulkan drivers: kernels against their twins, and pictures of two scenes. The second driver
 //! is the one that `tools/setup.sh` unpacks into `target/second-driver`; without it these tests are skipped.
 
-#[path = "common/skip.rs"]
-mod skip;
-
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use image::GrayImage;
-use skip::{Lacking, skip};
+
+use crate::common::skip::{Lacking, skip};
 
 /// Share of a picture's pixels that may differ by more than one grey level between two drivers.
 const APART: f64 = 1e-3;

@@ -1,10 +1,6 @@
 //! Values within the documented ranges never panic: they are refused with a remedy or pictured, and every picture
 //! consists of numbers. Both ends of every key of `docs/scenes.md` alone, two of them at a time, and all keys at once.
 
-#[path = "common/signal.rs"]
-#[allow(dead_code, reason = "only random numbers")]
-mod signal;
-
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
@@ -17,7 +13,8 @@ use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer, tables};
 use insonify::view::Model;
 use insonify::view::model::File;
-use signal::Random;
+
+use crate::common::signal::Random;
 
 /// A scene with every table, small enough that a picture takes some milliseconds.
 const SCENE: &str = r#"

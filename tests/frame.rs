@@ -1,11 +1,6 @@
 //! Whole frames of the shipped scenes on the device: a frame repeats exactly, both tracers show
 //! the same image, and nothing is lost on the way.
 
-#[path = "common/shared_data.rs"]
-mod shared_data;
-#[path = "common/tracers.rs"]
-mod tracers;
-
 use std::path::Path;
 use std::sync::Arc;
 
@@ -15,8 +10,9 @@ use insonify::sim::bvh::Splits;
 use insonify::sim::layout::Frame;
 use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer, tables};
-use shared_data::{shared_data, skip};
-use tracers::tracers;
+
+use crate::common::shared_data::shared_data;
+use crate::common::tracers::tracers;
 
 /// A scene at a size that a software driver renders in seconds.
 fn small(file: &str) -> Scene {

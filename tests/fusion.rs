@@ -1,10 +1,5 @@
 //! Fusion from the scene file to the frame: refusals, echoes, dumps.
 
-#[path = "common/shared_data.rs"]
-mod shared_data;
-#[path = "common/tracers.rs"]
-mod tracers;
-
 use std::path::Path;
 use std::sync::Arc;
 
@@ -17,8 +12,9 @@ use insonify::sim::fusion::Tint;
 use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer};
 use insonify::volume::Voxels;
-use shared_data::{shared_data, skip};
-use tracers::tracers;
+
+use crate::common::shared_data::shared_data;
+use crate::common::tracers::tracers;
 
 /// A ball around a depth of 25 mm, and a block of higher priority from its middle to the left: the
 /// ball's surface lies within the block there. No refraction: all sound is equally fast.

@@ -8,18 +8,13 @@ use insonify::gpu::{
     lone_test_device,
 };
 
-#[path = "gpu/accel.rs"]
+use crate::common::skip;
+use crate::common::timestamps;
+
 mod accel;
-#[path = "gpu/commands.rs"]
 mod commands;
-#[path = "gpu/dynamic.rs"]
 mod dynamic;
-#[path = "gpu/sheet.rs"]
 mod sheet;
-#[path = "common/skip.rs"]
-mod skip;
-#[path = "common/timestamps.rs"]
-mod timestamps;
 
 /// Group size of `add.comp` in these tests; not its default.
 const ADD_GROUP: u32 = 32;

@@ -3,9 +3,6 @@
 //! Real frames (in vivo and clinical): mean grey of tissue 30 to 68 with a skewness of +0.6 to +1.9; full width at half
 //! maximum of the autocovariance of greys along the scanline 0.81 to 0.94 wavelengths, across it 2.3 to 3.0 times that.
 
-#[path = "common/moments.rs"]
-mod moments;
-
 use std::path::Path;
 
 use insonify::gpu::test_device;
@@ -14,7 +11,8 @@ use insonify::settings::{GreyMap, Probe};
 use insonify::sim::layout::Label;
 use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer};
-use moments::{autocovariance, deviation, half_width, mean, transposed};
+
+use crate::common::moments::{autocovariance, deviation, half_width, mean, transposed};
 
 /// Scanlines of a window, and its depth, mm; those about it that have to show the same tissue.
 const WINDOW: (usize, f64) = (18, 6.0);

@@ -1,17 +1,14 @@
 //! Bad input: every mesh at hand and scenes with planted mistakes, through the program itself.
 
-#[path = "common/limited.rs"]
-mod limited;
-#[path = "common/shared_data.rs"]
-mod shared_data;
-
 use std::collections::BTreeMap;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
-use limited::{Outcome, check, files, limited};
-use shared_data::shared_data;
+
+use crate::common::limited::{Outcome, check, files, limited};
+use crate::common::shared_data::shared_data;
+use crate::common::skip::{Lacking, skip};
 
 /// Files that look like meshes, readable or not, in a fixed order.
 fn meshes(folder: &Path) -> Vec<PathBuf> {
@@ -222,7 +219,7 @@ fn files_of_defects_are_right_or_refused_with_a_reason() {
     let wanted = |path: &Path| path.extension().is_some_and(|e| e != "md");
     let paths = if defects.is_dir() { files(&defects, wanted) } else { Vec::new() };
     if paths.is_empty() {
-        shared_data::skip::skip(shared_data::skip::Lacking::Data, "no files of defects");
+        skip(Lacking::Data, "no files of defects");
     }
     let wrong = |path: &PathBuf| {
         let outcome = check(path);

@@ -1,9 +1,6 @@
 //! Every kernel against its f64 twin: random, empty, of size one, of odd sizes, with NaN and
 //! infinity; and an error planted into each kernel's outputs is caught.
 
-#[path = "common/skip.rs"]
-mod skip;
-
 use std::path::Path;
 
 use insonify::gpu::{Kernel, test_device};
@@ -11,7 +8,8 @@ use insonify::output::npy;
 use insonify::sim::shaders::Library;
 use insonify::sim::stages;
 use insonify_tools::harness::{self, Case, Element, Job, SUBJECTS, Size, dump};
-use skip::{Lacking, skip};
+
+use crate::common::skip::{Lacking, skip};
 
 const GLSL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/glsl");
 

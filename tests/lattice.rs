@@ -1,10 +1,6 @@
 //! Lattices that follow the resolution cell: speckle is fully developed and equally bright at every depth of every
 //! probe, no transition between levels shows, and it rests in the tissue while the probe moves.
 
-#[path = "common/signal.rs"]
-#[allow(dead_code, reason = "no random numbers here")]
-mod signal;
-
 use std::f64::consts::{FRAC_PI_4, PI, SQRT_2};
 
 use glam::{DAffine3, DQuat, DVec3};
@@ -14,6 +10,8 @@ use insonify::scene::{Scene, Simulation};
 use insonify::sim::calibration::Calibration;
 use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer, tables};
+
+use crate::common::signal;
 
 /// Complex baseband per scanline.
 type Lines = Vec<Vec<[f64; 2]>>;

@@ -1,10 +1,5 @@
 //! A scanline made alone: it is the image's, and many of them are M-mode.
 
-#[path = "common/skip.rs"]
-mod skip;
-#[path = "common/tracers.rs"]
-mod tracers;
-
 use std::f64::consts::TAU;
 use std::path::Path;
 
@@ -12,7 +7,8 @@ use insonify::gpu::test_device;
 use insonify::scene::Scene;
 use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer};
-use tracers::tracers;
+
+use crate::common::tracers::tracers;
 
 /// A shipped scene with few lines.
 fn scene(name: &str, more: &[(&str, &str)]) -> Scene {

@@ -1,9 +1,6 @@
 //! `insonify match`: the closed form (an image of the simulator itself, made with other settings), a real
 //! volume, and the messages where nothing can be matched.
 
-#[path = "common/shared_data.rs"]
-mod shared_data;
-
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -12,7 +9,8 @@ use insonify::matching::{self, Adjusted, Matching, Options, Stage, depths};
 use insonify::scene::{Imaging, Scene};
 use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer};
-use shared_data::shared_data;
+
+use crate::common::shared_data::shared_data;
 
 /// Liver everywhere; the mask is an island of the same liver.
 const SCENE: &str = r#"# An island.

@@ -1,14 +1,12 @@
 //! A sweep of PLUS, compared with the volume that PLUS made of it: first by our reconstruction, then by PLUS's
 //! arithmetic written here, which explains the difference.
 
-#[path = "common/shared_data.rs"]
-mod shared_data;
-
 use std::path::Path;
 
 use glam::{DAffine3, DVec3};
 use insonify::volume::{Compounding, Config, Sequence, Volume, reconstruct};
-use shared_data::shared_data;
+
+use crate::common::shared_data::shared_data;
 
 /// Differences of a volume from the stored one.
 #[derive(Debug)]

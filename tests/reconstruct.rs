@@ -1,9 +1,6 @@
 //! Volumes from tracked frames, compared with the source of the frames, and the command. The comparison with a
 //! volume of PLUS: tests/plus.rs.
 
-#[path = "common/program.rs"]
-mod program;
-
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -12,7 +9,8 @@ use insonify::volume::{
     Compounding, Filling, Interpolation, Pose, Sequence, Settings, TrackedFrame, Transforms,
     Volume, Voxels, reconstruct,
 };
-use program::insonify;
+
+use crate::common::program::insonify;
 
 /// A field linear in space.
 fn field(at: DVec3) -> f64 {

@@ -1,10 +1,5 @@
 //! Several images of one frame: each is what it is alone.
 
-#[path = "common/skip.rs"]
-mod skip;
-#[path = "common/tracers.rs"]
-mod tracers;
-
 use std::path::Path;
 
 use glam::{DAffine3, DVec3};
@@ -12,7 +7,8 @@ use insonify::gpu::test_device;
 use insonify::scene::Scene;
 use insonify::sim::shaders::Library;
 use insonify::sim::{Shot, Simulator, Tracer};
-use tracers::tracers;
+
+use crate::common::tracers::tracers;
 
 /// A shipped scene with few lines.
 fn scene(name: &str, more: &[(&str, &str)]) -> Scene {

@@ -1,11 +1,6 @@
 //! The work that a fused frame saves: around the masks sound goes straight on, and paths that nobody hears are
 //! not traced.
 
-#[path = "common/skip.rs"]
-mod skip;
-#[path = "common/tracers.rs"]
-mod tracers;
-
 use std::sync::Arc;
 
 use insonify::gpu::{Device, test_device};
@@ -13,7 +8,8 @@ use insonify::scene::Scene;
 use insonify::sim::layout::Counters;
 use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer, dump, tables};
-use tracers::tracers;
+
+use crate::common::tracers::tracers;
 
 /// Two balls, the second behind the first, both beside the middle; a plate with the surrounding speed lies in
 /// front of parts of both. No refraction.

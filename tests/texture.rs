@@ -1,12 +1,6 @@
 //! Speckle rests in the tissue: it moves with an instance, follows a deformation of known displacements, and
 //! slides where a setting demands it.
 
-#[path = "common/shared_data.rs"]
-mod shared_data;
-#[path = "common/signal.rs"]
-#[allow(dead_code, reason = "no random numbers here")]
-mod signal;
-
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 use insonify::gpu::test_device;
 use insonify::probe::{Kind, Probe};
@@ -18,7 +12,9 @@ use insonify::sim::calibration::Calibration;
 use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer, fields::Fields};
 use insonify_tools::reference::field::Field;
-use shared_data::shared_data;
+
+use crate::common::shared_data::shared_data;
+use crate::common::signal;
 
 /// Depths between which speckle is measured, mm: inside the body, off its faces.
 const DEPTHS: [f64; 2] = [10.0, 38.0];

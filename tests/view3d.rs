@@ -1,11 +1,6 @@
 //! The 3D view's picture against closed forms: the outline of a sphere in perspective, the places of the image
 //! plane's corners, the half that is cut away.
 
-#[path = "common/skip.rs"]
-mod skip;
-#[path = "common/tracers.rs"]
-mod tracers;
-
 use std::f64::consts::PI;
 use std::path::Path;
 
@@ -16,7 +11,8 @@ use insonify::sim::Simulator;
 use insonify::sim::shaders::Library;
 use insonify::sim::view3d::CameraView;
 use insonify::view::model::{Show, View3d};
-use tracers::tracers;
+
+use crate::common::tracers::tracers;
 
 const SIZE: [u32; 2] = [240, 200];
 

@@ -1,11 +1,6 @@
 //! Volumes of other programs: values and positions compared with ITK's from the same files, and the program on
 //! every file at hand, also cut and changed.
 
-#[path = "common/limited.rs"]
-mod limited;
-#[path = "common/shared_data.rs"]
-mod shared_data;
-
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -13,8 +8,9 @@ use std::path::{Path, PathBuf};
 use bzip2::write::BzEncoder;
 use flate2::write::GzEncoder;
 use insonify::volume::{Sequence, Volume, Voxels, is_volume};
-use limited::{Outcome, check, files};
-use shared_data::shared_data;
+
+use crate::common::limited::{Outcome, check, files};
+use crate::common::shared_data::shared_data;
 
 const SETS: [&str; 3] = ["corpus-nrrd-nifti", "us-plus", "us-itkultrasound"];
 

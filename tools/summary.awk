@@ -1,5 +1,5 @@
 # Sums up the output of `cargo test` and of pytest, a line for each program: what passed, failed with names, or died, and
-# its time. Exit code 1 if anything failed or died, or nothing was run.
+# its time; of what failed, the command that runs it alone. Exit code 1 if anything failed or died, or nothing was run.
 
 function close_program() {
   if (program == "") return
@@ -9,6 +9,17 @@ function close_program() {
     died++
   }
   program = ""
+}
+# The command for each of the tests that failed, by how cargo names the program that has them.
+function alone(names, n, i, name, which) {
+  which = program
+  sub(/\.rs$/, "", which)
+  if (sub(/^tests\//, "--test ", which)) ;
+  else if (which ~ /lib$/) which = "--lib"
+  else if (which ~ /^Doc-tests/) which = "--doc"
+  else which = "--bin " (which == "src/main" ? "insonify" : which)
+  n = split(names, name, " ")
+  for (i = 1; i <= n; i++) report("  alone", "", "cargo test --features anatomy " which " -- --exact " name[i])
 }
 function report(state, name, text) { lines[++count] = sprintf("%-7s %-34s %s", state, name, text) }
 
@@ -30,7 +41,10 @@ program != "" && /^test result: / {
   match(result, /[0-9]+ failed/); fails = substr(result, RSTART, RLENGTH) + 0
   match(result, /finished in [0-9.]+/); seconds = substr(result, RSTART + 12, RLENGTH - 12)
   passed += passes; failed += fails
-  if (fails) report("failed", program, fails " of " (passes + fails) ":" names ", " seconds " s")
+  if (fails) {
+    report("failed", program, fails " of " (passes + fails) ":" names ", " seconds " s")
+    alone(names)
+  }
   else if (passes) report("passed", program, passes ", " seconds " s")
   next
 }

@@ -51,10 +51,14 @@ while [ $# -gt 0 ]; do
   *) arguments+=("$1") && chosen=1 && shift ;;
   esac
 done
-# Runs a command, with its output in a file of the report too. Returns its exit code.
+# Runs a command, with its output in a file of the report too; on the screen each test has its number of how many.
+# Returns its exit code.
 reported() {
   local file=$report/$1 && shift
-  "$@" 2>&1 | tee "$file"
+  "$@" 2>&1 | tee "$file" | awk '
+    /^running [0-9]+ tests?$/ { of = $2; n = 0 }
+    /^test .* \.\.\. / { n++; printf "[%*d/%d] ", length(of), n, of }
+    { print; fflush() }'
   return "${PIPESTATUS[0]}"
 }
 # A program that dies leaves its memory behind where the system writes that into the folder.

@@ -10,7 +10,7 @@ use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer};
 use serde_json::Value;
 
-use crate::phantom::{along_y, block, layers, place, tissue, with};
+use crate::bumps::phantom::{along_y, block, layers, place, tissue, with};
 
 /// Places of the wires, mm.
 const WIRES: [[f64; 2]; 3] = [[-5.0, 26.0], [0.0, 34.0], [5.0, 40.0]];

@@ -10,9 +10,9 @@ use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer};
 use rayon::prelude::*;
 
-use crate::lumen::{LEAST, dark, levels, share, unrefracted};
-use crate::phantom::{Random, with};
-use crate::shared;
+use crate::bumps::lumen::{LEAST, dark, levels, share, unrefracted};
+use crate::bumps::phantom::{Random, with};
+use crate::common::shared_data;
 
 /// Vessels, cysts and gallbladder of the patient's liver.
 const LUMINA: [&str; 7] = [
@@ -78,7 +78,7 @@ fn in_lumina(scene: &Scene) -> Vec<bool> {
 /// The nested vessels of a segmented liver, from eight sides.
 #[test]
 fn vessels_of_a_patient_stay_whole() {
-    if shared::shared_data().is_none() {
+    if shared_data::shared_data().is_none() {
         return;
     }
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/scenes/liver.toml");

@@ -8,9 +8,9 @@ use insonify::settings::Refraction;
 use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer};
 
-use crate::lumen::{LEAST, dark, levels, share, unrefracted};
-use crate::phantom::{Random, along_y, block, bumps, layers, place, tissue, with};
-use crate::tracers::tracers;
+use crate::bumps::lumen::{LEAST, dark, levels, share, unrefracted};
+use crate::bumps::phantom::{Random, along_y, block, bumps, layers, place, tissue, with};
+use crate::common::tracers::tracers;
 
 /// Depth of the bumpy surface, mm.
 const TOP: f64 = 15.0;

@@ -2,7 +2,7 @@
 
 use insonify::gpu::Device;
 
-use crate::skip::{Lacking, skip};
+use super::skip::{Lacking, skip};
 
 /// True where the device's queue has timestamps; else false, with a message that times are not tested.
 pub fn timestamps(device: &Device) -> bool {

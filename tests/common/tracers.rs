@@ -3,7 +3,7 @@
 use insonify::gpu::Device;
 use insonify::sim::Tracer;
 
-use crate::skip::{Lacking, skip};
+use super::skip::{Lacking, skip};
 
 /// Both tracers; the compute tracer alone on a device without ray queries, where the other half of the test is skipped
 /// with a message.

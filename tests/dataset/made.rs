@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::{Desk, PARTS, SAMPLES, desk, files, program};
+use crate::dataset::{Desk, PARTS, SAMPLES, desk, files, program};
 
 #[test]
 fn a_shard_alone_is_the_same_bytes_as_in_the_whole() {

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use insonify::dataset::Plan;
 
-use crate::{Desk, PLAN, SCENE};
+use crate::dataset::{Desk, PLAN, SCENE};
 
 /// What is changed in the plan, the line at which the message points, and parts of the message.
 const MISTAKES: &[(&str, &str, &[&str])] = &[

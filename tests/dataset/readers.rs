@@ -3,11 +3,9 @@
 use std::path::PathBuf;
 use std::sync::OnceLock;
 
-use crate::skip::{Lacking, skip};
-use crate::{Desk, SAMPLES, SCENE, desk, files};
-
-#[path = "../common/python.rs"]
-pub mod python;
+use crate::common::python;
+use crate::common::skip::{Lacking, skip};
+use crate::dataset::{Desk, SAMPLES, SCENE, desk, files};
 
 /// A Python with webdataset and pyuff_ustb; none where they cannot be had.
 pub fn readers() -> Option<PathBuf> {

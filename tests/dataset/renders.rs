@@ -4,8 +4,9 @@ use std::sync::OnceLock;
 
 use serde_json::json;
 
-use crate::readers::{python, readers, zea};
-use crate::{Desk, program};
+use crate::common::python;
+use crate::dataset::readers::{readers, zea};
+use crate::dataset::{Desk, program};
 
 /// A loop of three frames in both formats, with labels and with arrays of its last frame; the plate rises in it.
 fn looped() -> &'static Desk {
@@ -15,7 +16,7 @@ fn looped() -> &'static Desk {
         let mut args = vec!["--frames", "3", "--fps", "2", "--set", "probe.kind=convex"];
         args.extend(["--set", "probe.radius=30", "--set", "probe.field_of_view=40 deg"]);
         args.extend(["--dump", "dump", "--labels", "labels.npz"]);
-        desk.write("scene.toml", &crate::SCENE.replace("width = \"12 mm\"\n", ""));
+        desk.write("scene.toml", &crate::dataset::SCENE.replace("width = \"12 mm\"\n", ""));
         for output in ["loop.hdf5", "loop.uff", "image.png"] {
             let all = [&["render", "scene.toml", "--tracer", "bvh", "-o", output], &args[..]];
             let (went_well, said) = program::insonify(desk.path("").as_path(), &all.concat());

@@ -4,8 +4,8 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::skip::{Lacking, skip};
-use crate::{Desk, PLAN, files};
+use crate::common::skip::{Lacking, skip};
+use crate::dataset::{Desk, PLAN, files};
 
 /// Number of files that end so, while a run may be writing.
 fn count(folder: &Path, ending: &str) -> usize {
@@ -58,11 +58,11 @@ fn a_killed_run_is_gone_on_with_to_the_same_bytes() {
     desk.made(&["-o", "killed", "--resume", "--shard", "0/10"]);
     assert!(folder.join("webdataset/.test-000003.tar.1").exists());
     desk.made(&["-o", "killed", "--resume"]);
-    assert!(files(&folder) == files(&crate::desk().path("whole")));
+    assert!(files(&folder) == files(&crate::dataset::desk().path("whole")));
     let said = desk.made(&["-o", "killed", "--resume"]);
     // One is made again to be compared.
     assert!(said.contains("1 samples made, 19 were there"), "{said}");
-    assert!(files(&folder) == files(&crate::desk().path("whole")));
+    assert!(files(&folder) == files(&crate::dataset::desk().path("whole")));
     // A file that the sample is made of is another one now.
     let spoilt = folder.join("folder/train/000000.png");
     std::fs::copy(folder.join("folder/train/000001.png"), spoilt).expect("copied");
@@ -108,7 +108,7 @@ fn a_full_disk_is_an_error_that_loses_nothing() {
     let kept = desk.path("kept");
     let left = files(&kept);
     assert!(left.len() > 2 + 5 && !left.keys().any(|n| n.contains("/.")), "{:?}", left.keys());
-    let whole = files(&crate::desk().path("whole"));
+    let whole = files(&crate::dataset::desk().path("whole"));
     assert!(
         left.len() < whole.len() && left.iter().all(|(name, bytes)| whole.get(name) == Some(bytes))
     );

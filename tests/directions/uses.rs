@@ -1,4 +1,4 @@
-//! The paths in sources: `crate::a::b`, chains of `super`, trees of a `use`, inside macros too.
+//! The paths in sources: `crate::directions::a::b`, chains of `super`, trees of a `use`, inside macros too.
 
 use std::collections::BTreeMap;
 use std::fs;

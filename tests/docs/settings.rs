@@ -1,5 +1,5 @@
 //! The text lines of `docs/scenes.md` that follow from the program: a row of a table for each key, the units, and
-//! the parameters of `insonify vary`. `INSONIFY_BLESS=1 cargo test --test docs` writes them.
+//! the parameters of `insonify vary`. `INSONIFY_BLESS=1 cargo test --test cpu docs` writes them.
 
 use insonify::scene::file::{Key, reference};
 use insonify::scene::tissue::table;

@@ -8,7 +8,7 @@ use insonify::igtl::message::{Content, HEADER, Message};
 use insonify::igtl::wire::checksum;
 use insonify::igtl::{Server, TrackerState};
 
-use crate::client::{Client, grey, query, serve, settings, shift, until};
+use crate::common::client::{Client, grey, query, serve, settings, shift, until};
 
 /// A good tracker and viewer at the same time.
 fn assert_serves(server: &Server) {

@@ -9,7 +9,7 @@ use insonify::igtl::command;
 use insonify::igtl::image::Image;
 use insonify::igtl::message::{Content, Message};
 
-use crate::client::{Client, shift};
+use crate::common::client::{Client, shift};
 
 /// A small frame of a scene that stands still.
 const SMALL: [&str; 12] = [

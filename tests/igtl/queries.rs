@@ -7,7 +7,7 @@ use insonify::igtl::message::{Content, ExtendedHeader, Message};
 use insonify::igtl::wire::Label;
 use insonify::igtl::{IMAGE_DEVICE, POSE_DEVICE};
 
-use crate::client::{Client, grey, query, serve, settings, shift, until};
+use crate::common::client::{Client, grey, query, serve, settings, shift, until};
 
 /// The status byte of an RTS message.
 fn status(client: &mut Client, kind: &str) -> u8 {

@@ -10,7 +10,7 @@ use insonify::igtl::{IMAGE_DEVICE, POSE_DEVICE, Server, ServerSettings, TrackerS
 use insonify::scene::Tracker;
 use insonify::scene::tracker::Axes;
 
-use crate::client::{Client, grey, picture, serve, settings, shift, until};
+use crate::common::client::{Client, grey, picture, serve, settings, shift, until};
 
 /// Last place of the probe.
 fn place(server: &Server) -> DVec3 {

@@ -7,7 +7,7 @@ use insonify::scene::tracker::Axes;
 use insonify::volume::Scalar;
 use serde_json::Value;
 
-use crate::shared_data::shared_data;
+use crate::common::shared_data::shared_data;
 
 // Written by pyigtl 0.3.4: `tools/oracle/igtl.py vectors`.
 const TRANSFORM: &str = "00015452414e53464f524d00000050726f6265546f5265666572656e636500000000499602d2800000000000\

@@ -3,7 +3,7 @@
 use glam::DVec3;
 use insonify::import::LabelMap;
 
-use crate::program::insonify;
+use crate::common::program::insonify;
 
 /// One element with its type, in little endian.
 fn element(tag: (u16, u16), kind: &str, value: &[u8]) -> Vec<u8> {

@@ -3,9 +3,9 @@
 use glam::DVec3;
 use insonify::scene::{Scene, shapes};
 
-use crate::obj;
-use crate::program::insonify;
-use crate::shared_data::shared_data;
+use crate::common::program::insonify;
+use crate::common::shared_data::shared_data;
+use crate::import::obj;
 
 fn priority(scene: &Scene, name: &str) -> i32 {
     let found = scene.instances.iter().find(|i| i.name == name);

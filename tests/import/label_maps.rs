@@ -6,9 +6,9 @@ use glam::DVec3;
 use insonify::scene::Scene;
 use insonify::volume::is_volume;
 
-use crate::limited::{check, files, limited};
-use crate::program::insonify;
-use crate::shared_data::shared_data;
+use crate::common::limited::{check, files, limited};
+use crate::common::program::insonify;
+use crate::common::shared_data::shared_data;
 
 /// A NIfTI-1 file of labels: RAS, voxels of these sizes in mm, its first voxel at `origin` (RAS, mm).
 fn nifti(

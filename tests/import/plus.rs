@@ -8,9 +8,9 @@ use insonify::scene::shapes;
 use insonify::sim::layout::{Label, NONE};
 use insonify::volume::track;
 
-use crate::obj;
-use crate::program::insonify;
-use crate::shared_data::shared_data;
+use crate::common::program::insonify;
+use crate::common::shared_data::shared_data;
+use crate::import::obj;
 
 /// Pixels to the marker on the probe: uneven sizes of pixels, oblique.
 fn image_to_probe() -> DAffine3 {

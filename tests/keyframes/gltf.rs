@@ -4,10 +4,10 @@ use std::path::Path;
 
 use insonify::scene::mesh::{AnimatedMesh, Choice, Options, Units, load_animated};
 
-use crate::compare::{Corners, ROUNDING, reach};
-use crate::document::Document;
-use crate::pose::{Planted, Pose};
-use crate::shared_data::shared_data;
+use crate::common::shared_data::shared_data;
+use crate::keyframes::compare::{Corners, ROUNDING, reach};
+use crate::keyframes::document::Document;
+use crate::keyframes::pose::{Planted, Pose};
 
 struct Sample {
     file: &'static str,

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use insonify::scene::Mesh;
 use insonify::scene::mesh::{Choice, Options, Units, load_animated, load_keyframes};
 
-use crate::compare::{Corners, ROUNDING, reach};
-use crate::shared_data::shared_data;
+use crate::common::shared_data::shared_data;
+use crate::keyframes::compare::{Corners, ROUNDING, reach};
 
 const SURFACES: [&str; 3] = ["LV_ENDOCARDIAL", "RV_ENDOCARDIAL", "EPICARDIAL"];
 const PHASES: usize = 25;

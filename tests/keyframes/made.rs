@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use insonify::scene::mesh::{Animated, Choice, Options, Placement, Units, load_animated};
 use serde_json::{Value, json};
 
-use crate::compare::ROUNDING;
-use crate::document::{Document, to_base64};
-use crate::gltf::compare;
-use crate::pose::{Planted, Pose, apply};
+use crate::keyframes::compare::ROUNDING;
+use crate::keyframes::document::{Document, to_base64};
+use crate::keyframes::gltf::compare;
+use crate::keyframes::pose::{Planted, Pose, apply};
 
 /// Bytes of a file's buffer and their descriptions.
 #[derive(Default)]

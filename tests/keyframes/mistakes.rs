@@ -6,7 +6,7 @@ use insonify::scene::Issue;
 use insonify::scene::mesh::{Choice, Options, Units, load_animated, load_keyframes};
 use serde_json::{Value, json};
 
-use crate::made::{bending, tree, written};
+use crate::keyframes::made::{bending, tree, written};
 
 /// One mistake: the change, the requested animation, and the message.
 struct Mistake {
@@ -42,7 +42,7 @@ fn overwrite(json: &mut Value, accessor: &Value, values: &[f32]) {
     let view = accessor["bufferView"].as_u64().expect("an index") as usize;
     let buffers = json["buffers"].as_array_mut().expect("buffers");
     let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
-    let uri = crate::document::to_base64(&bytes);
+    let uri = crate::keyframes::document::to_base64(&bytes);
     buffers.push(json!({ "byteLength": bytes.len(),
         "uri": format!("data:application/octet-stream;base64,{uri}") }));
     let buffer = buffers.len() - 1;

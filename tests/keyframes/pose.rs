@@ -3,7 +3,7 @@
 
 use serde_json::Value;
 
-use crate::document::{Document, index_of};
+use crate::keyframes::document::{Document, index_of};
 
 /// Rows of an affine matrix.
 pub type Matrix = [[f64; 4]; 3];

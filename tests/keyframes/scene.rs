@@ -6,11 +6,11 @@ use glam::{DAffine3, DVec3};
 use insonify::scene::mesh::{Choice, Options, Units, load_animated};
 use insonify::scene::{Scene, Strategy};
 
-use crate::compare::ROUNDING;
-use crate::document::Document;
-use crate::made;
-use crate::pose::{Planted, Pose, apply};
-use crate::shared_data::shared_data;
+use crate::common::shared_data::shared_data;
+use crate::keyframes::compare::ROUNDING;
+use crate::keyframes::document::Document;
+use crate::keyframes::made;
+use crate::keyframes::pose::{Planted, Pose, apply};
 
 /// Resting values of a file are read in single precision: four levels of four roundings each, at most
 /// 200 mm away.

@@ -6,12 +6,9 @@ use std::sync::OnceLock;
 
 use serde_json::Value;
 
-#[path = "../common/python.rs"]
-mod common;
-
-use common::with;
-
-use crate::shared_data::skip::{Lacking, skip};
+use crate::common::python as common;
+use crate::common::python::with;
+use crate::common::skip::{Lacking, skip};
 
 /// A Python that has pydicom, in a folder of the build; none where it cannot be had. Made once, whoever asks first.
 pub fn python() -> Option<PathBuf> {

@@ -8,9 +8,9 @@ use insonify::scene::Scene;
 use insonify::scene::file::load_trajectory;
 use insonify::volume::{Sequence, Voxels, track, transform};
 
-use crate::QUICK;
-use crate::program::insonify;
-use crate::shared_data::shared_data;
+use crate::common::program::insonify;
+use crate::common::shared_data::shared_data;
+use crate::loops::QUICK;
 
 /// A way through all directions, its times unevenly apart.
 const WAY: &str = "time_s,x_mm,y_mm,z_mm,qw,qx,qy,qz\n2,12.3456789,-30,250,0.5,0.5,0.5,0.5\n\

@@ -10,8 +10,8 @@ use insonify::scene::Scene;
 use insonify::volume::Volume;
 use serde_json::Value;
 
-use crate::program::insonify;
-use crate::python::{errors, numbers, python, run};
+use crate::common::program::insonify;
+use crate::loops::python::{errors, numbers, python, run};
 
 const KIND: &str = "EnhancedUltrasoundVolume";
 

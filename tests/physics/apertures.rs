@@ -6,11 +6,11 @@ use insonify::probe::Kind;
 use insonify::scene::Scene;
 use serde_json::Value;
 
-use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};
-use crate::full_wave::{number, table};
-use crate::profile::width;
-use crate::render::Frame;
-use crate::resolution::{FWHM, gaussian_beam, points};
+use crate::physics::check::{Bench, Check, Curve, Outcome, Physics, Plot};
+use crate::physics::full_wave::{number, table};
+use crate::physics::profile::width;
+use crate::physics::render::Frame;
+use crate::physics::resolution::{FWHM, gaussian_beam, points};
 
 /// Speed of sound, mm/us.
 const SPEED: f64 = 1.54;

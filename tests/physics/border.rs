@@ -6,10 +6,10 @@ use glam::{DAffine3, DVec3};
 use insonify::probe::Kind;
 use insonify::scene::{Keyframes, Scene, shapes};
 
-use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};
-use crate::moments::{mean, signal_to_noise};
-use crate::scenes::{add_body, add_box, silent};
-use crate::speckle::{homogeneous, intensities, sigma_lateral};
+use crate::common::moments::{mean, signal_to_noise};
+use crate::physics::check::{Bench, Check, Curve, Outcome, Physics, Plot};
+use crate::physics::scenes::{add_body, add_box, silent};
+use crate::physics::speckle::{homogeneous, intensities, sigma_lateral};
 
 /// Check T14.
 pub fn a_border_along_the_beam_is_as_wide_as_the_beam() -> Check {

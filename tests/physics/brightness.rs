@@ -4,10 +4,10 @@ use insonify::scene::Scene;
 use insonify::settings::{Loss, Sampling};
 use insonify::sim::Tracer;
 
-use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};
-use crate::paths::Range;
-use crate::pictures::shown;
-use crate::skip::{Lacking, skip};
+use crate::common::skip::{Lacking, skip};
+use crate::physics::check::{Bench, Check, Curve, Outcome, Physics, Plot};
+use crate::physics::paths::Range;
+use crate::physics::pictures::shown;
 
 /// Check T24, in a whole scene.
 pub fn brightness_behind_the_abdominal_wall_does_not_depend_on_paths() -> Check {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use insonify::gpu;
 pub use insonify::output::plot::{Curve, Plot};
 
-use crate::render::{Renderer, renderers};
+use crate::physics::render::{Renderer, renderers};
 
 /// State of the physics: right, or wrong in the way of [`Check::planted`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -4,10 +4,10 @@ use std::f64::consts::{LN_2, PI, SQRT_2, TAU};
 
 use insonify::scene::Scene;
 
-use crate::check::{Bench, Check, Curve, Outcome, Physics, Picture, Plot};
-use crate::resolution::gaussian_beam;
-use crate::scenes::{add_point, linear, silent};
-use crate::signal::Random;
+use crate::common::signal::Random;
+use crate::physics::check::{Bench, Check, Curve, Outcome, Physics, Picture, Plot};
+use crate::physics::resolution::gaussian_beam;
+use crate::physics::scenes::{add_point, linear, silent};
 
 /// Number of scanlines over a width, mm; samples over 100 mm.
 const LINES: u32 = 96;

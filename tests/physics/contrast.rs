@@ -5,11 +5,11 @@ use std::f64::consts::PI;
 use glam::{DAffine3, DVec3};
 use insonify::scene::{Scene, Tissue};
 
-use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};
-use crate::moments::{decibel, deviation, gcnr, mean, slope};
-use crate::render::Frame;
-use crate::scenes::{add_box, add_sphere, tissue};
-use crate::speckle::{homogeneous, intensities};
+use crate::common::moments::{decibel, deviation, gcnr, mean, slope};
+use crate::physics::check::{Bench, Check, Curve, Outcome, Physics, Plot};
+use crate::physics::render::Frame;
+use crate::physics::scenes::{add_box, add_sphere, tissue};
+use crate::physics::speckle::{homogeneous, intensities};
 
 /// Intensities of the scanlines between two lateral positions, mm, and two depths.
 pub fn region(frame: &Frame, scene: &Scene, lines: [f64; 2], depths: [f64; 2]) -> Vec<f64> {

@@ -4,9 +4,9 @@ use glam::{DAffine3, DVec3};
 use insonify::scene::Scene;
 use insonify::settings::{Sampling, Sequence};
 
-use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};
-use crate::paths::{Range, TRACERS};
-use crate::scenes::{add_box, add_layer, linear, silent};
+use crate::physics::check::{Bench, Check, Curve, Outcome, Physics, Plot};
+use crate::physics::paths::{Range, TRACERS};
+use crate::physics::scenes::{add_box, add_layer, linear, silent};
 
 /// Check T24, the error at finite N.
 pub fn images_converge_at_least_with_the_root_of_the_paths() -> Check {

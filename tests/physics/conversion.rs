@@ -4,9 +4,9 @@ use insonify::probe::{Kind, Probe};
 use insonify::scene::Scene;
 use insonify::sim::{layout, tables};
 
-use crate::check::{Bench, Check, Outcome, Physics, Picture};
-use crate::signal::scene;
-use crate::stages::{Stages, every_kind};
+use crate::common::signal::scene;
+use crate::physics::check::{Bench, Check, Outcome, Physics, Picture};
+use crate::physics::stages::{Stages, every_kind};
 
 /// Smooth brightness over depth (mm) and position across the face (-1/2 .. 1/2): curved so strongly that half a
 /// sample (0.01-0.03 mm) and half a scanline change it by more than the 1e-3 allowed, and so little that bilinear

@@ -2,9 +2,9 @@
 
 use std::f64::consts::{PI, TAU};
 
-use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};
-use crate::hilbert::envelope;
-use crate::scenes::{add_point, linear, silent};
+use crate::physics::check::{Bench, Check, Curve, Outcome, Physics, Plot};
+use crate::physics::hilbert::envelope;
+use crate::physics::scenes::{add_point, linear, silent};
 
 /// Depth (mm) and amplitude of a row of points, some closer than a pulse is long, all near the focus.
 const ECHOES: [(f64, f64); 9] = [

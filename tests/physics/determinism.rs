@@ -4,8 +4,8 @@ use glam::{DAffine3, DVec3};
 use insonify::scene::{Instance, Keyframes, Scene, Surface, shapes};
 use insonify::sim::{Simulator, Tracer, shaders::Library};
 
-use crate::check::{Bench, Check, Outcome, Physics, Picture};
-use crate::scenes::{linear, tissue};
+use crate::physics::check::{Bench, Check, Outcome, Physics, Picture};
+use crate::physics::scenes::{linear, tissue};
 
 /// Check T34.
 pub fn a_frame_repeats_bit_for_bit_and_both_tracers_show_it() -> Check {

@@ -6,10 +6,10 @@ use insonify::scene::Scene;
 use insonify::settings::Sampling;
 use insonify_tools::reference::Segment;
 
-use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};
-use crate::paths::{Range, TRACERS};
-use crate::render::Inputs;
-use crate::scenes::{add_layer, add_point, linear, silent};
+use crate::physics::check::{Bench, Check, Curve, Outcome, Physics, Plot};
+use crate::physics::paths::{Range, TRACERS};
+use crate::physics::render::Inputs;
+use crate::physics::scenes::{add_layer, add_point, linear, silent};
 
 /// Speed mm/us, impedance MRayl, attenuation dB/(cm MHz), thickness mm of each layer. The last one
 /// lets nothing out; the interface before it reflects less than a hundredth.

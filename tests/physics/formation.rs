@@ -5,10 +5,10 @@ use insonify::scene::Scene;
 use insonify::sim::calibration::lateral_taps;
 use insonify::sim::{layout, tables};
 
-use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};
-use crate::hilbert::envelope;
-use crate::signal::{Random, scene};
-use crate::stages::{Stages, every_kind};
+use crate::common::signal::{Random, scene};
+use crate::physics::check::{Bench, Check, Curve, Outcome, Physics, Plot};
+use crate::physics::hilbert::envelope;
+use crate::physics::stages::{Stages, every_kind};
 
 /// Radio-frequency scanline of complex baseband: Re{IQ exp(+i 4 pi f0 z / c)}.
 fn remodulate(scene: &Scene, iq: &[f32]) -> Vec<f64> {

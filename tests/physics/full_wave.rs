@@ -5,11 +5,11 @@ use insonify::scene::Scene;
 use insonify_tools::reference::Segment;
 use serde_json::Value;
 
-use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};
-use crate::paths::{TRACERS, centroid, echo};
-use crate::refraction::{AXIS, RADIUS, offset, rays, traced};
-use crate::reverberation::mean_line;
-use crate::scenes::{add_layer, linear, silent};
+use crate::physics::check::{Bench, Check, Curve, Outcome, Physics, Plot};
+use crate::physics::paths::{TRACERS, centroid, echo};
+use crate::physics::refraction::{AXIS, RADIUS, offset, rays, traced};
+use crate::physics::reverberation::mean_line;
+use crate::physics::scenes::{add_layer, linear, silent};
 
 /// Results of outside simulators.
 pub fn table() -> Value {

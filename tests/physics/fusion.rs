@@ -12,8 +12,8 @@ use insonify::sim::fusion::FusionSteps;
 use insonify::sim::{Simulator, Tracer, shaders::Library};
 use insonify::volume::Voxels;
 
-use crate::check::{Bench, Check, Curve, Outcome, Physics, Picture, Plot};
-use crate::scenes::{add_body, add_box, add_sphere, linear, silent, tissue};
+use crate::physics::check::{Bench, Check, Curve, Outcome, Physics, Picture, Plot};
+use crate::physics::scenes::{add_body, add_box, add_sphere, linear, silent, tissue};
 
 const TRACERS: [Tracer; 2] = [Tracer::Bvh, Tracer::RayQuery];
 

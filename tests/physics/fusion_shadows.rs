@@ -9,8 +9,8 @@ use insonify::settings::{Blend, Fusion, MaskSpeed, Surroundings};
 use insonify::sim::{Simulator, Tracer, shaders::Library};
 use insonify::volume::Voxels;
 
-use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};
-use crate::scenes::{add_box, linear, silent};
+use crate::physics::check::{Bench, Check, Curve, Outcome, Physics, Plot};
+use crate::physics::scenes::{add_box, linear, silent};
 
 /// Check T30.
 pub fn a_slab_throws_its_shadow_into_the_volume() -> Check {

@@ -4,11 +4,11 @@ use glam::{DAffine3, DVec3};
 use insonify::scene::Scene;
 use insonify::settings::ScatterMode;
 
-use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};
-use crate::moments::{autocovariance, correlation, gaussian_fwhm, transposed};
-use crate::profile::width;
-use crate::render::Frame;
-use crate::speckle::{DEPTHS, homogeneous, intensities, sigma_axial, sigma_lateral};
+use crate::common::moments::{autocovariance, correlation, gaussian_fwhm, transposed};
+use crate::physics::check::{Bench, Check, Curve, Outcome, Physics, Plot};
+use crate::physics::profile::width;
+use crate::physics::render::Frame;
+use crate::physics::speckle::{DEPTHS, homogeneous, intensities, sigma_axial, sigma_lateral};
 
 /// Check T12.
 pub fn speckle_grains_are_as_large_as_the_point_spread_function() -> Check {

@@ -7,11 +7,11 @@ use insonify::settings::Loss;
 use insonify::sim::Tracer;
 use insonify_tools::reference::Segment;
 
-use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};
-use crate::paths::{Range, TRACERS};
-use crate::refraction::traced;
-use crate::render::{Inputs, angle};
-use crate::scenes::{add_box, add_layer, add_point, linear, silent, tissue};
+use crate::physics::check::{Bench, Check, Curve, Outcome, Physics, Plot};
+use crate::physics::paths::{Range, TRACERS};
+use crate::physics::refraction::traced;
+use crate::physics::render::{Inputs, angle};
+use crate::physics::scenes::{add_box, add_layer, add_point, linear, silent, tissue};
 
 /// Speed mm/us and impedance MRayl of water, fat, muscle, liver, bone, air.
 const FLUIDS: [[f64; 2]; 6] = [

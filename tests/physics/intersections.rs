@@ -1,14 +1,5 @@
 //! Hits of rays on triangles, by both tracers. The suite of all kinds of rays is `tests/intersect`.
 
-#[path = "../intersect/beating.rs"]
-pub mod beating;
-#[path = "../intersect/compare.rs"]
-pub mod compare;
-#[path = "../intersect/device.rs"]
-pub mod device;
-#[path = "../intersect/rays.rs"]
-pub mod rays;
-
 use std::sync::Arc;
 
 use glam::{DAffine3, DVec3};
@@ -16,10 +7,12 @@ use insonify::scene::{Scene, shapes};
 use insonify::sim::tracer::Tracer;
 use rayon::prelude::*;
 
-use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};
+use crate::physics::check::{Bench, Check, Curve, Outcome, Physics, Plot};
 use compare::{by_aim, expected, slips, wrong};
 use device::{Rig, Traced};
 use rays::{Ray, aimed_at_seams, baked, mirrored, placement, rays, scene, turned};
+
+use crate::common::crossings::{compare, device, rays};
 
 pub const TRACERS: [Tracer; 2] = [Tracer::Bvh, Tracer::RayQuery];
 

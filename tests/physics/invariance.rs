@@ -6,11 +6,11 @@ use glam::{DAffine3, DQuat, DVec3};
 use insonify::scene::Scene;
 use insonify::settings::{Loss, Sampling};
 
-use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};
-use crate::moments::{decibel, mean};
-use crate::render::Frame;
-use crate::scenes::{add_box, add_sphere, linear, silent, tissue};
-use crate::speckle::{homogeneous, intensities, sigma_elevation, sigma_lateral};
+use crate::common::moments::{decibel, mean};
+use crate::physics::check::{Bench, Check, Curve, Outcome, Physics, Plot};
+use crate::physics::render::Frame;
+use crate::physics::scenes::{add_box, add_sphere, linear, silent, tissue};
+use crate::physics::speckle::{homogeneous, intensities, sigma_elevation, sigma_lateral};
 
 /// Level of unattenuated liver, dB re a perfect mirror.
 const LIVER: f64 = -45.0;

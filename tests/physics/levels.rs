@@ -3,9 +3,9 @@
 use insonify::probe::{Kind, Probe};
 use insonify::scene::Scene;
 
-use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};
-use crate::render::Frame;
-use crate::scenes::{linear, tissue};
+use crate::physics::check::{Bench, Check, Curve, Outcome, Physics, Plot};
+use crate::physics::render::Frame;
+use crate::physics::scenes::{linear, tissue};
 
 const RANGE: f64 = 120.0;
 

@@ -7,7 +7,7 @@ use insonify::scene::Scene;
 use insonify::sim::{Simulator, Tracer, layout, shaders::Library, tables};
 use insonify_tools::reference::Segment;
 
-use crate::check::Bench;
+use crate::physics::check::Bench;
 
 /// Both tracers.
 pub const TRACERS: [Tracer; 2] = [Tracer::Bvh, Tracer::RayQuery];

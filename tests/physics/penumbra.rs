@@ -5,10 +5,10 @@ use insonify::probe::Kind;
 use insonify::scene::Scene;
 use insonify::settings::Loss;
 
-use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};
-use crate::moments::mean;
-use crate::scenes::{add_box, silent};
-use crate::speckle::{homogeneous, sigma_lateral};
+use crate::common::moments::mean;
+use crate::physics::check::{Bench, Check, Curve, Outcome, Physics, Plot};
+use crate::physics::scenes::{add_box, silent};
+use crate::physics::speckle::{homogeneous, sigma_lateral};
 
 /// Check T36.
 pub fn the_edge_of_a_shadow_is_as_wide_as_the_aperture_makes_it() -> Check {

@@ -5,8 +5,8 @@ use insonify::probe::Probe;
 use insonify::scene::{Scene, Tissue};
 use insonify::settings::{Imaging, Simulation};
 
-use crate::check::{Bench, Picture};
-use crate::scenes::{add_box, add_sphere, linear};
+use crate::physics::check::{Bench, Picture};
+use crate::physics::scenes::{add_box, add_sphere, linear};
 
 fn shipped(name: &str) -> Tissue {
     Tissue::shipped(name).unwrap_or_else(|| panic!("no {name}"))

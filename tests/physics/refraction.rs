@@ -7,11 +7,11 @@ use insonify::scene::{Instance, Keyframes, Mesh, Scene, Tissue};
 use insonify::settings::{Loss, Refraction};
 use insonify_tools::reference::Segment;
 
-use crate::check::{Bench, Check, Curve, Outcome, Physics, Picture, Plot};
-use crate::paths::{Range, TRACERS};
-use crate::pictures::shown;
-use crate::render::Inputs;
-use crate::scenes::{add_point, linear, mirror, silent, tissue};
+use crate::physics::check::{Bench, Check, Curve, Outcome, Physics, Picture, Plot};
+use crate::physics::paths::{Range, TRACERS};
+use crate::physics::pictures::shown;
+use crate::physics::render::Inputs;
+use crate::physics::scenes::{add_point, linear, mirror, silent, tissue};
 
 /// Radius of the cylinder, depth of its axis, and distance behind it at which the rays are compared, mm.
 pub const RADIUS: f64 = 5.0;

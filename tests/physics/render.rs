@@ -11,7 +11,7 @@ use insonify::sim::{Simulator, Tracer, layout, placement, shaders::Library, tabl
 use insonify_tools::reference::{Accumulator, Owned, Segment};
 use insonify_tools::reference::{axial, beam, detect, display, scatter};
 
-use crate::check::Picture;
+use crate::physics::check::Picture;
 
 /// A scene in the form that the kernels read.
 pub struct Inputs(Owned);

@@ -5,11 +5,11 @@ use std::f64::consts::{LN_2, PI, SQRT_2};
 use insonify::scene::Scene;
 use insonify::settings::ScatterMode;
 
-use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};
-use crate::moments::decibel;
-use crate::profile::width;
-use crate::render::{Frame, Renderer};
-use crate::scenes::{add_point, linear, silent};
+use crate::common::moments::decibel;
+use crate::physics::check::{Bench, Check, Curve, Outcome, Physics, Plot};
+use crate::physics::profile::width;
+use crate::physics::render::{Frame, Renderer};
+use crate::physics::scenes::{add_point, linear, silent};
 
 /// Gaussian: full width at half maximum over sigma.
 pub const FWHM: f64 = 2.354_82;

@@ -5,10 +5,10 @@ use insonify::scene::Scene;
 use insonify::settings::Sampling;
 use insonify::sim::Tracer;
 
-use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};
-use crate::paths::{Range, TRACERS, centroid, echo};
-use crate::pictures::shown;
-use crate::scenes::{add_box, add_layer, add_point, linear, silent};
+use crate::physics::check::{Bench, Check, Curve, Outcome, Physics, Plot};
+use crate::physics::paths::{Range, TRACERS, centroid, echo};
+use crate::physics::pictures::shown;
+use crate::physics::scenes::{add_box, add_layer, add_point, linear, silent};
 
 /// Pressure reflection coefficients of the slab's faces. The second detour passes the front face
 /// with probability .25: the chain is drawn often enough to be counted.
@@ -274,7 +274,7 @@ fn mirror_image(bench: &Bench, physics: Physics) -> Outcome {
         let truth = render(&direct).envelope(0);
         let with = render(&mirrored(1, 1.0, Some(degrees))).envelope(0);
         let without = render(&mirrored(1, 1.0, absent)).envelope(0);
-        let place = crate::profile::centre(&with, window.clone(), 8);
+        let place = crate::physics::profile::centre(&with, window.clone(), 8);
         let expected = (MIRROR + TARGET) / pitch;
         out.compare(format!("{name}: place, samples"), place, expected, 1.0)
             .unlike("the straight way to the target", MIRROR.hypot(TARGET) / pitch);

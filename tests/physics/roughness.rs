@@ -7,9 +7,9 @@ use insonify::settings::Sampling;
 use insonify_tools::reference::acoustics::power_cosine;
 use insonify_tools::reference::random::{PURPOSE_NORMAL, path_random, unit};
 
-use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};
-use crate::paths::{Range, TRACERS, echo};
-use crate::scenes::{add_layer, add_point, linear, silent};
+use crate::physics::check::{Bench, Check, Curve, Outcome, Physics, Plot};
+use crate::physics::paths::{Range, TRACERS, echo};
+use crate::physics::scenes::{add_layer, add_point, linear, silent};
 
 const PATHS: u32 = 16384;
 /// Roughness exponents and, with each, the exponent of the echo's lobe.

@@ -1,21 +1,21 @@
 //! The validation table: every check once, for the tests and for the report.
 
-use crate::check::Check;
+use crate::physics::check::Check;
 
 macro_rules! rows {
     ($($module:ident::$name:ident),* $(,)?) => {
         /// All checks, in the order of the table's rows.
         pub fn all() -> Vec<Check> {
-            vec![$(crate::$module::$name()),*]
+            vec![$(super::$module::$name()),*]
         }
 
         #[cfg(test)]
         mod proofs {
             $(#[test]
             fn $name() {
-                let check = crate::$module::$name();
+                let check = super::super::$module::$name();
                 assert_eq!(check.name, stringify!($name));
-                crate::check::prove(&check);
+                crate::physics::check::prove(&check);
             })*
         }
     };

@@ -5,12 +5,12 @@ use insonify::sim::tracer::Tracer;
 use insonify_tools::reference::intersect::Hit;
 use rayon::prelude::*;
 
-use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};
-use crate::intersections::TRACERS;
-use crate::intersections::beating::{KEYFRAMES, beating, show, strategies, union_box};
-use crate::intersections::compare::{by_aim, expected, slips, wrong};
-use crate::intersections::device::Rig;
-use crate::intersections::rays::{Ray, rays};
+use crate::common::crossings::beating::{KEYFRAMES, beating, show, strategies, union_box};
+use crate::common::crossings::compare::{by_aim, expected, slips, wrong};
+use crate::common::crossings::device::Rig;
+use crate::common::crossings::rays::{Ray, rays};
+use crate::physics::check::{Bench, Check, Curve, Outcome, Physics, Plot};
+use crate::physics::intersections::TRACERS;
 
 /// Check T32.
 pub fn every_strategy_shows_the_keyframe() -> Check {

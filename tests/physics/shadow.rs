@@ -3,12 +3,12 @@
 use glam::{DAffine3, DVec3};
 use insonify::settings::Loss;
 
-use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};
-use crate::contrast::region;
-use crate::moments::{decibel, mean};
-use crate::pictures;
-use crate::scenes::{add_box, add_sphere, silent};
-use crate::speckle::homogeneous;
+use crate::common::moments::{decibel, mean};
+use crate::physics::check::{Bench, Check, Curve, Outcome, Physics, Plot};
+use crate::physics::contrast::region;
+use crate::physics::pictures;
+use crate::physics::scenes::{add_box, add_sphere, silent};
+use crate::physics::speckle::homogeneous;
 
 /// Share of intensity that a wall between two impedances reflects at normal incidence, or at any with equal
 /// speeds.

@@ -4,13 +4,13 @@ use std::f64::consts::{PI, TAU};
 
 use insonify::scene::Scene;
 
-use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};
-use crate::moments::{
+use crate::common::moments::{
     critical_distance, decibel, deviation, exponential_distance, kurtosis, mean, signal_to_noise,
 };
-use crate::pictures;
-use crate::render::Frame;
-use crate::scenes::{linear, tissue};
+use crate::physics::check::{Bench, Check, Curve, Outcome, Physics, Plot};
+use crate::physics::pictures;
+use crate::physics::render::Frame;
+use crate::physics::scenes::{linear, tissue};
 
 /// Lossless fully developed speckle with the whole slice sampled, seen by scanlines `pitch` mm apart. The beam is
 /// equally wide at every depth: received with F# 2 everywhere, transmitted so weakly focused that it hardly counts.

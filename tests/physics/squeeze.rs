@@ -4,11 +4,11 @@ use glam::{DAffine3, DVec3};
 use insonify::scene::Scene;
 use insonify_tools::reference::Segment;
 
-use crate::check::{Bench, Check, Outcome, Physics};
-use crate::interfaces::fresnel;
-use crate::refraction::traced;
-use crate::render::angle;
-use crate::scenes::{add_box, linear, tissue};
+use crate::physics::check::{Bench, Check, Outcome, Physics};
+use crate::physics::interfaces::fresnel;
+use crate::physics::refraction::traced;
+use crate::physics::render::angle;
+use crate::physics::scenes::{add_box, linear, tissue};
 
 /// Speed mm/us and impedance MRayl before the slab and in it.
 const BEFORE: [f64; 2] = [1.44, 1.34];

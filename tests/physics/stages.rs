@@ -106,7 +106,7 @@ mod tests {
     use insonify::sim::tables;
 
     use super::*;
-    use crate::signal::scene;
+    use crate::common::signal::scene;
 
     /// An accumulator's end is reported once per sample, whichever of its four numbers reached it.
     #[test]

@@ -5,13 +5,13 @@ use insonify::scene::Scene;
 use insonify::settings::{Loss, Refraction};
 use insonify_tools::reference::Segment;
 
-use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};
-use crate::interfaces::fresnel;
-use crate::moments::{decibel, mean};
-use crate::refraction::{AROUND, RADIUS, offset, passage, traced};
-use crate::render::{Frame, twin_of};
-use crate::scenes::{add_box, add_sphere, tissue};
-use crate::speckle::homogeneous;
+use crate::common::moments::{decibel, mean};
+use crate::physics::check::{Bench, Check, Curve, Outcome, Physics, Plot};
+use crate::physics::interfaces::fresnel;
+use crate::physics::refraction::{AROUND, RADIUS, offset, passage, traced};
+use crate::physics::render::{Frame, twin_of};
+use crate::physics::scenes::{add_box, add_sphere, tissue};
+use crate::physics::speckle::homogeneous;
 
 /// Check T39.
 pub fn speckle_is_as_bright_however_refraction_parts_the_paths() -> Check {

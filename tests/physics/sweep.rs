@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::check::{Bench, Figure, Outcome, Physics};
-use crate::moments::mean;
-use crate::{grain, speckle};
+use crate::common::moments::mean;
+use crate::physics::check::{Bench, Figure, Outcome, Physics};
+use crate::physics::{grain, speckle};
 
 const SEEDS: u32 = 16;
 

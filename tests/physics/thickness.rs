@@ -7,9 +7,9 @@ use insonify::scene::Scene;
 use insonify::settings::{Coherence, Sampling};
 use insonify::sim::Tracer;
 
-use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};
-use crate::paths::{Range, TRACERS, echo};
-use crate::scenes::{add_box, linear, silent};
+use crate::physics::check::{Bench, Check, Curve, Outcome, Physics, Plot};
+use crate::physics::paths::{Range, TRACERS, echo};
+use crate::physics::scenes::{add_box, linear, silent};
 
 /// Frequency, MHz; and speed to which the machine and, unless stated, the medium are set, mm/us.
 const FREQUENCY: f64 = 7.0;

@@ -2,10 +2,10 @@
 
 use insonify::scene::Scene;
 
-use crate::check::{Bench, Check, Outcome, Physics};
-use crate::profile::centre;
-use crate::render::Renderer;
-use crate::scenes::{add_layer, linear, silent};
+use crate::physics::check::{Bench, Check, Outcome, Physics};
+use crate::physics::profile::centre;
+use crate::physics::render::Renderer;
+use crate::physics::scenes::{add_layer, linear, silent};
 
 /// Check T3.
 pub fn a_plate_shows_at_its_time_of_flight() -> Check {

@@ -4,13 +4,13 @@ use glam::{DAffine3, DVec3};
 use insonify::scene::Scene;
 use serde_json::Value;
 
-use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};
-use crate::full_wave::number;
-use crate::moments::{decibel, mean};
-use crate::refraction::{RADIUS, tube};
-use crate::render::Frame;
-use crate::scenes::{add_body, silent, tissue};
-use crate::speckle::homogeneous;
+use crate::common::moments::{decibel, mean};
+use crate::physics::check::{Bench, Check, Curve, Outcome, Physics, Plot};
+use crate::physics::full_wave::number;
+use crate::physics::refraction::{RADIUS, tube};
+use crate::physics::render::Frame;
+use crate::physics::scenes::{add_body, silent, tissue};
+use crate::physics::speckle::homogeneous;
 
 /// Check T38.
 pub fn speckle_behind_a_round_vessel_is_as_bright_as_waves_make_it() -> Check {

@@ -5,7 +5,7 @@ use insonify::random::{gaussian, pcg4d, unit};
 use insonify::register::surface::{Triangle, samples};
 use insonify::scene::{Mesh, Scene, shapes};
 
-use crate::program::insonify;
+use crate::common::program::insonify;
 
 /// A model under a moved parent, and a volume that is turned, shifted and displaced by the unknown transform.
 pub const SCENE: &str = r#"# A sac.

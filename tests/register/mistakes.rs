@@ -2,9 +2,9 @@
 
 use glam::DVec3;
 
-use crate::SURFACE;
-use crate::case::{Case, SCENE, model};
-use crate::program::insonify;
+use crate::common::program::insonify;
+use crate::register::SURFACE;
+use crate::register::case::{Case, SCENE, model};
 
 #[test]
 fn mistakes_are_explained_and_nothing_is_written() {

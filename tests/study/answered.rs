@@ -6,8 +6,8 @@ use insonify::study::answers::{FORMAT, VERSION};
 use insonify::study::key::{Key, crc32};
 use serde_json::{Value, json};
 
-use crate::program::insonify;
-use crate::{desk, files};
+use crate::common::program::insonify;
+use crate::study::{desk, files};
 
 /// Answers of an assessor who always takes the scene itself, agrees by 4 and puts the volume first.
 fn saved(key: &Key, response: &str) -> Value {

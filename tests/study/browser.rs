@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use tempfile::TempDir;
 use ureq::Agent;
 
-use crate::skip::{Lacking, skip};
+use crate::common::skip::{Lacking, skip};
 
 /// Longest wait for anything, on a busy machine, too.
 pub const PATIENCE: Duration = Duration::from_secs(240);

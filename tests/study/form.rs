@@ -8,8 +8,8 @@ use insonify::study::answers::Answers;
 use insonify::study::form::{Case, Form};
 use serde_json::{Value, json};
 
-use crate::browser::{Browser, ENTER, PATIENCE, RIGHT, SPACE};
-use crate::{IMAGES, desk, program};
+use crate::study::browser::{Browser, ENTER, PATIENCE, RIGHT, SPACE};
+use crate::study::{IMAGES, desk, program};
 
 /// Presses the button that saves; the only file in the folder of downloads then, moved out of it.
 fn save(browser: &Browser, to: &Path) -> PathBuf {

@@ -5,7 +5,7 @@ use std::path::Path;
 use insonify::scene::Scene;
 use insonify::scene::file::Plan;
 
-use crate::{Desk, PLAN, SCENE, files};
+use crate::study::{Desk, PLAN, SCENE, files};
 
 #[test]
 fn mistakes_are_explained() {

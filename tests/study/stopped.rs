@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::{Desk, IMAGES, VOLUME, files, paths};
+use crate::study::{Desk, IMAGES, VOLUME, files, paths};
 
 fn spawned(desk: &Desk, folder: &str) -> Child {
     Command::new(env!("CARGO_BIN_EXE_insonify"))
@@ -45,10 +45,10 @@ fn a_killed_run_is_gone_on_with() {
     let (went_well, said) = desk.make(&["-o", "killed", "--resume", "--seed", "3"]);
     assert!(!went_well && said.contains("another order: 0, not 3"), "{said}");
     desk.made(&["-o", "killed", "--resume"]);
-    assert!(files(&folder) == files(&crate::desk().path("first")));
+    assert!(files(&folder) == files(&crate::study::desk().path("first")));
     // Another run changes nothing.
     desk.made(&["-o", "killed", "--resume"]);
-    assert!(files(&folder) == files(&crate::desk().path("first")));
+    assert!(files(&folder) == files(&crate::study::desk().path("first")));
     // The file named by the scene differs now, but the scene's own text does not.
     let voxels = [VOLUME.as_bytes(), &[77; 60]].concat();
     std::fs::write(desk.path("volume.mha"), voxels).expect("written");

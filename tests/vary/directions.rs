@@ -2,8 +2,8 @@
 
 use image::GrayImage;
 
-use crate::moments::{self, transposed};
-use crate::{Row, swept};
+use crate::common::moments::{self, transposed};
+use crate::vary::{Row, swept};
 
 /// Pixels per mm.
 const PER_MM: f64 = 20.0;

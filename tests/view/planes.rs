@@ -3,8 +3,8 @@
 use glam::DAffine3;
 use insonify::scene::Scene;
 
-use crate::desk::{Desk, Display, Key};
-use crate::{brightness, difference};
+use crate::view::desk::{Desk, Display, Key};
+use crate::view::{brightness, difference};
 
 /// A ball in a volume that is bright on its right half.
 const SCENE: &str = r#"name = "Registered"

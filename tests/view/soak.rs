@@ -11,9 +11,9 @@ use std::time::{Duration, Instant};
 use glam::{DQuat, DVec3};
 use insonify::scene::Scene;
 
-use crate::brightness;
-use crate::client::Client;
-use crate::desk::{Desk, Display, Key};
+use crate::common::client::Client;
+use crate::view::brightness;
+use crate::view::desk::{Desk, Display, Key};
 
 /// Within the image of the heart, while the M-mode strip is below it.
 const IMAGE: [u16; 4] = [200, 100, 200, 150];

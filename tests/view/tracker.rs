@@ -5,9 +5,9 @@ use std::time::Duration;
 
 use insonify::igtl::message::{Content, HEADER, Message};
 
-use crate::client::{Client, shift};
-use crate::desk::{Desk, Key};
-use crate::{IMAGE, SCENE, brightness, difference};
+use crate::common::client::{Client, shift};
+use crate::view::desk::{Desk, Key};
+use crate::view::{IMAGE, SCENE, brightness, difference};
 
 /// The part with a notice, over the image and below its texts.
 const NOTICE: [u16; 4] = [16, 54, 440, 42];

@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::process::Command;
 
-use crate::desk::{self, Desk, Key};
-use crate::{IMAGE, SCENE, brightness, difference};
+use crate::view::desk::{self, Desk, Key};
+use crate::view::{IMAGE, SCENE, brightness, difference};
 
 /// A trajectory: half a second along the image by 12 mm.
 const WAY: &str = "time_s,x_mm,y_mm,z_mm\n0,0,0,0\n0.25,6,0,0\n0.5,12,0,0\n";

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder};
 
-use crate::check::{Check, Examined, Figure, Picture};
+use crate::physics::check::{Check, Examined, Figure, Picture};
 use insonify::output::plot::{escape, svg};
 
 /// Rows of the validation table.
@@ -214,8 +214,8 @@ fn base64(bytes: &[u8]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::check::{Bench, Curve, Outcome, Physics, Plot, examine, prove};
-    use crate::rows;
+    use crate::physics::check::{Bench, Curve, Outcome, Physics, Plot, examine, prove};
+    use crate::physics::rows;
 
     fn one_figure(measured: f64) -> Outcome {
         let mut out = Outcome::default();

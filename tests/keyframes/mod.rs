@@ -9,5 +9,3 @@ mod made;
 mod mistakes;
 mod pose;
 mod scene;
-#[path = "../common/shared_data.rs"]
-mod shared_data;

@@ -6,24 +6,18 @@ mod levels;
 mod motion;
 mod painted;
 mod power;
-#[path = "../common/program.rs"]
-mod program;
-#[path = "../physics/scenes.rs"]
-#[allow(dead_code, reason = "the scenes of other tests")]
-mod scenes;
-#[path = "../common/skip.rs"]
-mod skip;
-#[path = "../common/timestamps.rs"]
-mod timestamps;
-#[path = "../common/tracers.rs"]
-mod tracers;
 
+use crate::physics::scenes;
 use insonify::gpu::test_device;
 use insonify::scene::Scene;
 use insonify::sim::labels::Labels;
 use insonify::sim::layout::Label;
 use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer};
+
+use crate::common::program;
+use crate::common::timestamps;
+use crate::common::tracers;
 
 /// A simulator of a scene that asks for labels.
 fn simulator(scene: &mut Scene, tracer: Tracer) -> Simulator {

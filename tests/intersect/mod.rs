@@ -2,20 +2,12 @@
 //!
 //! The device is a software driver where no GPU is at hand; every check runs on both tracers.
 
-mod beating;
-mod compare;
-mod device;
 mod joined;
 mod keyframes;
 mod placements;
-mod rays;
 mod refit;
-#[path = "../common/skip.rs"]
-mod skip;
 mod splits;
 mod suite;
-#[path = "../common/tracers.rs"]
-mod tracers;
 mod walk;
 
 use std::sync::Arc;
@@ -29,8 +21,11 @@ use insonify::sim::tracer::Tracer;
 use insonify_tools::reference::intersect::Hit;
 use rayon::prelude::*;
 use rays::{Random, Ray, aimed_at_seams, corners, mirrored, placement, rays, scene, turned};
-use tracers::tracers;
 use walk::{clear_hits, walk};
+
+use crate::common::crossings::{beating, compare, device, rays};
+use crate::common::tracers;
+use crate::common::tracers::tracers;
 
 fn shape(index: usize) -> Scene {
     let near = placement(DVec3::ONE, DVec3::X, 0.0, DVec3::new(0.0, 0.0, 60.0));

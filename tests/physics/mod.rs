@@ -5,7 +5,7 @@
 mod apertures;
 mod border;
 mod brightness;
-mod check;
+pub mod check;
 mod cole;
 mod contrast;
 mod convergence;
@@ -23,10 +23,8 @@ mod interfaces;
 mod intersections;
 mod invariance;
 mod levels;
-#[path = "../common/moments.rs"]
-mod moments;
 #[path = "../../tools/validate/page.rs"]
-mod page;
+pub mod page;
 mod paths;
 mod penumbra;
 mod pictures;
@@ -36,14 +34,10 @@ mod render;
 mod resolution;
 mod reverberation;
 mod roughness;
-mod rows;
-mod scenes;
+pub mod rows;
+pub mod scenes;
 mod selectors;
 mod shadow;
-#[path = "../common/signal.rs"]
-mod signal;
-#[path = "../common/skip.rs"]
-mod skip;
 mod speckle;
 mod squeeze;
 mod stages;

@@ -1,21 +1,18 @@
 //! Loops and volumes in DICOM, read back by pydicom and held to the standard by dciodvfy; loops with poses, read back by
 //! our own importer. What 3D Slicer makes of them is computed by its rules (docs/volumes.md, "In 3D Slicer").
 
-#[path = "../common/program.rs"]
-mod program;
 mod python;
 mod sequences;
-#[path = "../common/shared_data.rs"]
-mod shared_data;
 mod volumes;
 
 use std::path::Path;
 
 use insonify::output::dicom::{self, About, Loop, Patient, Study, Transducer};
 use insonify::scene::Scene;
-use program::insonify;
 use python::{errors, numbers, python, run};
 use serde_json::Value;
+
+use crate::common::program::insonify;
 
 /// Settings with which a frame takes a second.
 const QUICK: [&str; 6] = [

@@ -8,13 +8,7 @@ use insonify::scene::Mesh;
 mod dicom;
 mod folders;
 mod label_maps;
-#[path = "../common/limited.rs"]
-mod limited;
 mod plus;
-#[path = "../common/program.rs"]
-mod program;
-#[path = "../common/shared_data.rs"]
-mod shared_data;
 
 /// A mesh as the text of an OBJ file, moved.
 fn obj(mesh: &Mesh, shift: DVec3) -> String {

@@ -5,8 +5,6 @@
 mod authors;
 mod beside;
 #[allow(dead_code)]
-#[path = "../igtl/client.rs"]
-mod client;
 mod contact;
 mod desk;
 mod dicom;
@@ -18,8 +16,6 @@ mod mmode;
 mod panels;
 mod planes;
 mod robust;
-#[path = "../common/skip.rs"]
-mod skip;
 mod soak;
 mod tools;
 mod tracker;
@@ -30,6 +26,8 @@ mod view3d;
 use std::time::Duration;
 
 use desk::{Desk, Key};
+
+use crate::common::skip;
 
 /// A cyst and wires in liver; small, so that a frame takes a software driver some milliseconds.
 const SCENE: &str = r#"

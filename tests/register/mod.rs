@@ -6,15 +6,11 @@ use std::path::Path;
 use glam::{DAffine3, DQuat, DVec3};
 use insonify::scene::{Scene, mesh};
 
+use crate::common::tracers;
+
 mod case;
 mod live;
 mod mistakes;
-#[path = "../common/program.rs"]
-mod program;
-#[path = "../common/skip.rs"]
-mod skip;
-#[path = "../common/tracers.rs"]
-mod tracers;
 
 use case::{Case, SCENE, apex, model, obj, vtp_in_ras};
 

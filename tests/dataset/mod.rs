@@ -5,16 +5,13 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
+use crate::common::program;
+
 mod made;
 mod plans;
 mod readers;
 mod renders;
 mod stopped;
-
-#[path = "../common/program.rs"]
-mod program;
-#[path = "../common/skip.rs"]
-mod skip;
 
 /// A plate that rises and falls in one tissue, below a skin.
 const SCENE: &str = r#"

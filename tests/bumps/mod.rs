@@ -4,10 +4,4 @@ mod full_wave;
 mod lumen;
 mod patient;
 mod phantom;
-#[path = "../common/shared_data.rs"]
-mod shared;
-#[path = "../common/tracers.rs"]
-mod tracers;
 mod vessels;
-
-use shared::skip;

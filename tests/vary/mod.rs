@@ -8,8 +8,6 @@ use image::{GrayImage, imageops};
 use serde::Deserialize;
 
 mod directions;
-#[path = "../common/moments.rs"]
-mod moments;
 
 /// Speckle of one tissue down to a plate at 30 mm in which nothing scatters.
 const SCENE: &str = r#"

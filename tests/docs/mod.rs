@@ -45,7 +45,7 @@ fn the_reference_says_what_the_program_does() {
     if std::env::var_os("INSONIFY_BLESS").is_some() {
         return std::fs::write(path, wanted).expect("written");
     }
-    let remedy = "INSONIFY_BLESS=1 cargo test --test docs writes it";
+    let remedy = "INSONIFY_BLESS=1 cargo test --test cpu docs writes it";
     assert!(real == wanted, "docs/scenes.md is not up to date: {remedy}");
     // No table of keys is written by hand.
     let mut tables: Vec<_> = settings::lines(&real).into_iter().map(|line| line.table()).collect();

@@ -6,16 +6,13 @@ use std::sync::OnceLock;
 
 use insonify::study::key::{Key, Row};
 
+use crate::common::program;
+
 mod answered;
 mod browser;
 mod form;
 mod plans;
 mod stopped;
-
-#[path = "../common/program.rs"]
-mod program;
-#[path = "../common/skip.rs"]
-mod skip;
 
 /// Speckle of one tissue down to a plate at 14 mm, in a volume.
 const SCENE: &str = r#"

@@ -1,0 +1,19 @@
+//! What needs no device: readers, tables, closed forms, the sources and documents themselves.
+
+mod common {
+    pub mod limited;
+    pub mod shared_data;
+    pub mod signal;
+    pub mod skip;
+}
+
+mod animated;
+mod calibration;
+mod dicom;
+mod directions;
+mod docs;
+mod keyframes;
+mod layout;
+mod plus;
+mod spirv;
+mod volumes;
