@@ -62,7 +62,8 @@ pub fn pace(args: &Render, moments: &[Moment]) -> Option<f64> {
 }
 
 /// Numbers of the frames that are made together, in order: those between which the scene stands still. Labels say what
-/// has moved since the frame before, so that the first frame after a motion is then made alone.
+/// has moved since the frame before, so that the first frame after a motion is then made alone. So is the first of all:
+/// kernels are compiled meanwhile, and the frames of a group have the same times.
 pub fn groups(moments: &[Moment], scene: &Scene, most: usize) -> Vec<Range<usize>> {
     let moves =
         |a: usize, b: usize| scene.is_animated() && moments[a].seconds != moments[b].seconds;
@@ -71,7 +72,8 @@ pub fn groups(moments: &[Moment], scene: &Scene, most: usize) -> Vec<Range<usize
         let joins = |group: &&mut Range<usize>| {
             let moved = group.start > 0 && moves(group.start - 1, group.start);
             let alone = scene.simulation.labels && moved;
-            !alone && group.len() < most && !moves(index - 1, index)
+            let first = group.start == 0;
+            !first && !alone && group.len() < most && !moves(index - 1, index)
         };
         match groups.last_mut().filter(joins) {
             Some(group) => group.end += 1,
@@ -96,9 +98,9 @@ mod tests {
         let still = Scene { graph: Default::default(), ..labelled.clone() };
         let at = [0.0, 0.0, 0.0, 0.5, 0.5, 0.5, 1.0];
         let moments = at.map(|seconds| Moment { seconds, pose: None });
-        assert_eq!(groups(&moments, &heart, 9), [0..3, 3..6, 6..7]);
-        assert_eq!(groups(&moments, &heart, 2), [0..2, 2..3, 3..5, 5..6, 6..7]);
-        assert_eq!(groups(&moments, &labelled, 9), [0..3, 3..4, 4..6, 6..7]);
-        assert_eq!(groups(&moments, &still, 5), [0..5, 5..7]);
+        assert_eq!(groups(&moments, &heart, 9), [0..1, 1..3, 3..6, 6..7]);
+        assert_eq!(groups(&moments, &heart, 2), [0..1, 1..3, 3..5, 5..6, 6..7]);
+        assert_eq!(groups(&moments, &labelled, 9), [0..1, 1..3, 3..4, 4..6, 6..7]);
+        assert_eq!(groups(&moments, &still, 5), [0..1, 1..6, 6..7]);
     }
 }
