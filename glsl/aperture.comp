@@ -280,6 +280,16 @@ vec2 converged(uint layer, int l, uint node, uint row) {
     return vec2(gain, level_of(target));
 }
 
+// False around masks, where nobody hears the scanline: its main path reaches no node between which and this one a gain or a level
+// is interpolated.
+bool is_heard(uint layer, int l, uint node) {
+    if ((frame.flags & FLAG_MASKED) == 0u) return true;
+    uint first = node - min(node, LEVEL_STEP), last = min(node + LEVEL_STEP, APERTURE_BANDS);
+    bool reached = false;
+    for (uint at = first; at <= last; ++at) reached = reached || lost_at(layer, l, at) > UNKNOWN;
+    return reached;
+}
+
 void main() {
     uint thread = gl_LocalInvocationID.x;
     uint layer = gl_WorkGroupID.z;
@@ -302,7 +312,8 @@ void main() {
     uint line = layer * frame.scanlines + l;
     for (uint node = gl_WorkGroupID.y; node <= APERTURE_BANDS; node += gl_NumWorkGroups.y) {
         uint row = sample_at(frame.depth * float(node) / (BAND_COUNT * frame.sample_pitch));
-        vec2 found = converged(layer, int(l), node, row);
+        vec2 found = vec2(0.0);
+        if (is_heard(layer, int(l), node)) found = converged(layer, int(l), node, row);
         uint at = aperture_at(line, node);
         apertures[at].gain = found.x;
         apertures[at].level = found.y;

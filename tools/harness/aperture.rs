@@ -3,7 +3,7 @@
 use super::inputs::{Random, frame, rows, scanlines};
 use super::{Case, Check, Input, Job, Size, Subject, trace};
 use crate::reference::aperture::{self, Passed};
-use insonify::sim::layout::{APERTURE_BANDS, Aperture, Frame, Row};
+use insonify::sim::layout::{APERTURE_BANDS, Aperture, FLAG_MASKED, Frame, Row};
 use insonify::sim::stages;
 
 pub const SUBJECT: Subject = Subject {
@@ -70,8 +70,18 @@ pub(super) fn passed(frame: &Frame) -> Vec<Passed> {
 }
 
 fn job(case: Case, size: Size) -> Job {
-    let frame = frame(case, size);
+    let mut frame = frame(case, size);
     let mut passed = passed(&frame);
+    if case == Case::Modes {
+        // Around masks: some scanlines are not followed, others from somewhere on.
+        frame.flags |= FLAG_MASKED;
+        for line in 0..frame.scanlines * frame.layers {
+            let until = [0, APERTURE_BANDS + 1, line % APERTURE_BANDS][line as usize / 7 % 3];
+            for node in 0..until {
+                passed[aperture::place(&frame, line, node)].lost = aperture::UNKNOWN;
+            }
+        }
+    }
     if case == Case::NotFinite {
         passed[aperture::place(&frame, 2, 20)].lost = f64::INFINITY;
         passed[aperture::place(&frame, 2, 21)].lost = f64::INFINITY;

@@ -3,8 +3,8 @@
 use super::geometry::line_pitch;
 use insonify::sim::layout::{
     APERTURE_ALIKE, APERTURE_BANDS, APERTURE_FRONT, APERTURE_JUMP, APERTURE_RAYS, Aperture,
-    BENT_ALIKE, FLAG_APERTURE, Frame, KIND_PHASED, LEAST_LEVEL, LEAST_MAIN, LEAST_MISSED,
-    LEAST_PITCH, LEVEL_STEP, Row,
+    BENT_ALIKE, FLAG_APERTURE, FLAG_MASKED, Frame, KIND_PHASED, LEAST_LEVEL, LEAST_MAIN,
+    LEAST_MISSED, LEAST_PITCH, LEVEL_STEP, Row,
 };
 
 /// True if losses count by the aperture.
@@ -104,7 +104,9 @@ pub fn aperture(frame: &Frame, rows: &[Row], passed: &[Passed]) -> Vec<Found> {
             let target = Target { frame, row, passed, layer, node };
             for l in 0..frame.scanlines {
                 let line = layer * frame.scanlines + l;
-                out[place(frame, line, node)] = target.converged(l);
+                if target.is_heard(l) {
+                    out[place(frame, line, node)] = target.converged(l);
+                }
             }
         }
     }
@@ -122,6 +124,16 @@ struct Target<'a> {
 }
 
 impl Target<'_> {
+    /// False around masks: the main path of scanline `l` reaches neither the node nor one next to it, nor one of those that
+    /// have a level.
+    fn is_heard(&self, l: u32) -> bool {
+        let line = self.layer * self.frame.scanlines + l;
+        let last = (self.node + LEVEL_STEP).min(APERTURE_BANDS);
+        self.frame.flags & FLAG_MASKED == 0
+            || (self.node.saturating_sub(LEVEL_STEP)..=last)
+                .any(|node| self.passed[place(self.frame, line, node)].lost > UNKNOWN)
+    }
+
     /// Loss of scanline `l` between two nodes; none where it was not followed.
     fn lost_in(&self, l: u32, [begin, end]: [u32; 2]) -> Option<f64> {
         let line = self.layer * self.frame.scanlines + l;
