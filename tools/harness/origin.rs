@@ -39,15 +39,6 @@ fn job(case: Case, size: Size) -> Job {
         frame.flags |= FLAG_COINCIDENT;
     }
     let mut world = worlds::world(case);
-    // Each reaches farther on one side of the lines' starts: of equals the line says which is the outer one.
-    if matches!(case, Case::Odd | Case::Random) {
-        for (z, radius, priority) in
-            [(32.0, 25.3, 7), (21.0, 24.1, 7), (33.0, 26.9, 8), (20.0, 23.2, 9)]
-        {
-            let at = glam::DAffine3::from_translation(glam::DVec3::new(2.1, 0.4, z));
-            world.place(insonify::scene::shapes::sphere(radius, 2), at, 1, priority);
-        }
-    }
     // What some lines start in and others meet, in front of other organs or behind them.
     let masks: &[usize] = match case {
         Case::Odd => &[2, 4],
