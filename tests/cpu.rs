@@ -1,4 +1,4 @@
-//! What needs no device: readers, tables, closed forms, the sources and documents themselves.
+//! Tests of what needs no device: readers, tables, closed forms, the sources and documents themselves.
 
 mod common {
     pub mod limited;

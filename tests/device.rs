@@ -1,4 +1,4 @@
-//! What is computed on a Vulkan device, by the library.
+//! Tests of what the library computes on a Vulkan device.
 
 mod common {
     pub mod crossings;

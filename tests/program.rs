@@ -1,4 +1,4 @@
-//! The program `insonify`, run as by a user.
+//! Tests of the program `insonify`, run as by a user.
 
 mod common {
     pub mod client;

@@ -1,4 +1,4 @@
-//! The window, on a display of its own.
+//! Tests of the window, on a display of its own.
 
 mod common {
     #[allow(dead_code, reason = "what only the tests of the server use")]

@@ -6,9 +6,9 @@
 # -q  quality of both [default: standard]     -r  rounds that count [default: 5]
 # -a  one more argument of both, e.g. -a --set -a simulation.paths=8
 # OLD and NEW are programs, PROGRAM@COMMIT where git does not know what a program was built of.
-# A round is one run of each, now the one first, now the other. A run shows 40 frames and its median counts: programs of
-# before 2026-11-29 make up to 16 of them together, with the same times for each, and kernels are still compiled during
-# the first; a first round is not counted at all.
+# A round is one run of each, now the one first, now the other. A run shows 40 frames and its median counts: older
+# programs make the first of them together, some sixteen where the machine has 24 GB, with the same times for each, and
+# kernels are still compiled meanwhile; a first round is not counted at all.
 set -euo pipefail
 
 usage() { sed -n '2,9s/^# \{0,1\}//p' "$0" >&2; exit 2; }
