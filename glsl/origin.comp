@@ -1,8 +1,8 @@
 // variants: bvh query(RAY_QUERY) count(COUNT)
 #version 460
-// The media that enclose the start of each line, from signed crossings along its ray to infinity. If only
-// echoes from inside a mask are wanted, the way to it is the same for all paths of a line, which then begin
-// at its last surface.
+// The media that enclose the start of each line, from signed crossings along its ray to infinity, or along the ray the other
+// way where their order does not matter and no surface is at the start. If only echoes from inside a mask are wanted, the way to it
+// is the same for all paths of a line, which then begin at its last surface.
 #extension GL_GOOGLE_include_directive : require
 #ifdef RAY_QUERY
 #extension GL_EXT_ray_query : require
@@ -30,8 +30,9 @@ layout(std430, binding = 9) restrict readonly buffer ScanlineBuffer { Scanline s
 #include "triangle.glsl"
 
 const uint ALL = 0u;
-const uint AROUND = 1u;         // instances that may enclose the line's start: those whose box does
-const uint MASKS = 2u;
+const uint BEHIND = 1u;         // instances that may enclose the line's start, those whose box does; away from the line
+const uint AROUND = 2u;         // the same instances, along the line
+const uint MASKS = 3u;
 uint wanted = ALL;              // the instances that rays meet
 vec3 line_start;
 
@@ -88,7 +89,24 @@ void note_crossing(uint instance, bool entering, uint order) {
     }
 }
 
+// Distance below which two surfaces at a place are at the same one.
+float closeness(vec3 p) { return 4e-6 * max(max(abs(p.x), abs(p.y)), max(abs(p.z), 1.0)); }
+
 bool enters(vec3 d, Hit hit) { return dot(d, surface_geometric_normal(hit)) < 0.0; }
+
+// True if of the instances that enclose the start no two have the same priority, and all fit into a stack: it is the same
+// then in which order they are left.
+bool is_ordered() {
+    uint count = 0u;
+    for (uint i = 0u; i < open_count; ++i) {
+        if (open_net[i] <= 0) continue;
+        count += 1u;
+        for (uint j = 0u; j < i; ++j) {
+            if (open_net[j] > 0 && instances[open_ids[j]].priority == instances[open_ids[i]].priority) return false;
+        }
+    }
+    return count <= MAX_STACK;
+}
 
 // The media that enclose the start, once all crossings are noted; the outermost first, as it is left last.
 void enclose(inout Media media) {
@@ -134,29 +152,33 @@ void main() {
     bool masked = (frame.flags & FLAG_MASKED) != 0u && frame.origin_jitter <= 0.0 && frame.emission_lobe <= 0.0;
     float mask_t = 0.0, travelled = 0.0, weight = 1.0;
     uint interactions = 0u;
-    // Three tasks: whether a mask is ahead; the media around the start; the way to the mask, straight on as
-    // long as no echo is wanted. One loop for all, so that the kernel contains the traversal once.
-    wanted = masked ? MASKS : AROUND;
+    // Three tasks: whether a mask is ahead; the media around the start, looked for away from the line first, as a probe lies on
+    // the body and there is little of it behind; the way to the mask, straight on as long as no echo is wanted. One loop for
+    // all, so that the kernel contains the traversal once.
+    wanted = masked ? MASKS : BEHIND;
     float t_min = 0.0;
     uint order = 0u;
+    // A surface at the start is inside or outside as the line's own ray finds it, which paths follow, too. So the other ray begins
+    // as far in front of the start, and is not used if it meets one as near as that behind it.
+    float at_start = closeness(o);
     // The first of two surfaces that coincide was found; the ray looks for the other.
     bool pairing = false;
     Hit first = Hit(0.0, NONE, NONE, 0.0, 0.0);
     float close = 0.0;
     bool done = false;
     while (true) {
-        Hit hit = closest_hit(o, d, pairing ? max(first.t - close, 0.0) : t_min,
+        vec3 way = wanted == BEHIND ? -d : d, from = wanted == BEHIND ? o + at_start * d : o;
+        Hit hit = closest_hit(from, way, pairing ? max(first.t - close, 0.0) : t_min,
             pairing ? first.t + close : (wanted == ALL ? frame.depth : 1e9), pairing ? first.instance : NONE);
         if (wanted == MASKS) {
             // Outside of all masks, and none is ahead.
             if (hit.instance == NONE) { weight = 0.0; done = true; }
             mask_t = hit.t;
-            wanted = AROUND;
+            wanted = BEHIND;
         } else if (!pairing && hit.instance != NONE && (frame.flags & FLAG_COINCIDENT) != 0u) {
             first = hit;
             pairing = true;
-            vec3 p = o + hit.t * d;
-            close = 4e-6 * max(max(abs(p.x), abs(p.y)), max(abs(p.z), 1.0));
+            close = closeness(from + hit.t * way);
         } else {
             Hit twin = Hit(hit.t, NONE, NONE, 0.0, 0.0);
             if (pairing) {
@@ -164,8 +186,7 @@ void main() {
                 hit = first;
                 pairing = false;
             } else {
-                vec3 p = o + hit.t * d;
-                close = 4e-6 * max(max(abs(p.x), abs(p.y)), max(abs(p.z), 1.0));
+                close = closeness(from + hit.t * way);
             }
             bool met = hit.instance != NONE;
             uint surfaces = met ? (twin.instance != NONE ? 2u : 1u) : 0u;
@@ -178,16 +199,24 @@ void main() {
             for (uint i = 0u; i < surfaces; ++i) {
                 Hit each = hit;
                 if ((i == 0u) == turned) each = twin;
-                bool entering = enters(d, each);
-                if (wanted == AROUND) note_crossing(each.instance, entering, 2u * order + i);
+                bool entering = enters(way, each);
+                if (wanted != ALL) note_crossing(each.instance, entering, 2u * order + i);
                 else if (!cross_interface(after, each.instance, entering)) atomicAdd(counters.stack_overflow, 1u);
             }
-            if (wanted == AROUND) {
-                if (!met || order == MAX_CROSSINGS) {
+            if (wanted != ALL) {
+                bool ends = !met || order == MAX_CROSSINGS;
+                bool unsure = met && order == 1u && hit.t < 2.0 * at_start;
+                if (wanted == BEHIND && (unsure || (ends && (met || !is_ordered())))) {
+                    open_count = 0u;
+                    wanted = AROUND;
+                    ends = true;
+                } else if (ends) {
                     enclose(media);
                     done = !masked || is_heard(media);
                     if (!done && mask_t >= frame.depth) { weight = 0.0; done = true; }
                     wanted = ALL;
+                }
+                if (ends) {
                     t_min = 0.0;
                     order = 0u;
                 }

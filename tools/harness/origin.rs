@@ -5,13 +5,13 @@ use super::worlds;
 use super::{Case, Check, Input, Job, Size, Subject};
 use crate::reference::origin;
 use crate::reference::straight::Start;
-use insonify::sim::layout::{Counters, FLAG_COINCIDENT, FLAG_MASKED, START_WORDS};
+use insonify::sim::layout::{Counters, FLAG_COINCIDENT, FLAG_MASKED, KIND_LINEAR, START_WORDS};
 use insonify::sim::placement;
 use insonify::sim::stages;
 
 pub const SUBJECT: Subject = Subject {
-    tolerance: "media exact: no line of these worlds starts within 1e-3 mm of a surface or runs along \
-                one; the way to the mask within 1e-3 mm (a hundred of them round at 8e-6, a surface \
+    tolerance: "media exact: no line of these worlds runs along a surface or starts within 1e-3 mm of one, \
+                unless exactly on it; the way to the mask within 1e-3 mm (a hundred of them round at 8e-6, a surface \
                 met obliquely multiplies that) and the weight within 1e-4 (0.05 Np/mm over as much)",
     job,
     check,
@@ -39,6 +39,24 @@ fn job(case: Case, size: Size) -> Job {
         frame.flags |= FLAG_COINCIDENT;
     }
     let mut world = worlds::world(case);
+    // Each reaches farther on one side of the lines' starts: of equals the line says which is the outer one. Some lines start in
+    // one or none of these.
+    if matches!(case, Case::Odd | Case::Random) {
+        for (x, z, radius, priority) in [
+            (10.1, 31.0, 14.3, 7),
+            (11.3, 22.0, 13.1, 7),
+            (2.1, 33.0, 26.9, 8),
+            (2.1, 20.0, 23.2, 9),
+        ] {
+            let at = glam::DAffine3::from_translation(glam::DVec3::new(x, 0.4, z));
+            world.place(insonify::scene::shapes::sphere(radius, 2), at, 1, priority);
+        }
+    }
+    // A body on whose flat skin the face lies exactly: these lines have their starts in one plane.
+    if frame.kind == KIND_LINEAR {
+        let at = glam::DAffine3::from_translation(glam::DVec3::new(-12.0, 0.5, 31.0));
+        world.place(insonify::scene::shapes::cuboid([30.0, 30.0, 8.0]), at, 1, 10);
+    }
     // What some lines start in and others meet, in front of other organs or behind them.
     let masks: &[usize] = match case {
         Case::Odd => &[2, 4],

@@ -18,7 +18,12 @@ pub fn origin(world: &World) -> (Vec<Start>, u32) {
             let line = world_line(world.frame, l, e);
             let mut crossings = world.crossings(line.origin, line.direction, [0.0, f64::INFINITY]);
             crossings.truncate(CROSSINGS);
-            let (media, full) = media(world, &crossings);
+            let close = 4e-6 * line.origin.abs().max_element().max(1.0);
+            let ahead = line.origin + close * line.direction;
+            let behind = world.crossings(ahead, -line.direction, [0.0, f64::INFINITY]);
+            let unsure = behind.first().is_some_and(|c| c.t < 2.0 * close);
+            let decides = if !unsure && is_ordered(world, &behind) { &behind } else { &crossings };
+            let (media, full) = media(world, decides);
             overflow += u32::from(full);
             let (start, full) = world.start(media, &crossings);
             overflow += full;
@@ -37,6 +42,17 @@ pub(super) fn media(world: &World, crossings: &[Crossing]) -> (Stack, bool) {
         media.push(world.frame.couplant);
     }
     (Stack(media), full)
+}
+
+/// True if these crossings are all and no two of the instances that enclose the start have the same priority: it is the same
+/// then in which order they are left, and the kernel does not follow the line for it.
+fn is_ordered(world: &World, crossings: &[Crossing]) -> bool {
+    let around = enclosing(crossings);
+    let mut priorities: Vec<i32> =
+        around.iter().map(|&i| world.instances[i as usize].priority).collect();
+    priorities.sort_unstable();
+    priorities.dedup();
+    priorities.len() == around.len() && around.len() <= MAX_STACK && crossings.len() < CROSSINGS
 }
 
 /// Instances left more often than entered; the one whose last exit is farthest comes first.
@@ -108,6 +124,29 @@ mod tests {
         assert_eq!(pack(&stacks), packed);
         let back: [u32; START_WORDS] = packed.try_into().expect("the words of one line");
         assert_eq!(unpack(&back), stacks[0]);
+    }
+
+    #[test]
+    fn where_equals_overlap_the_one_that_the_line_leaves_last_is_the_outermost() {
+        let around = |priorities: [i32; 2]| {
+            let mut fixture = Fixture::new(vec![tissue(1.5, 1.5, 0.0)]);
+            for (z, priority) in [3.0, -3.0].into_iter().zip(priorities) {
+                fixture.sphere(DVec3::new(0.3, 0.2, z), 10.0, 24, 0, priority);
+            }
+            origin(&fixture.world()).0[0].media.0.clone()
+        };
+        assert_eq!(around([4, 4]), [0, 1]);
+        assert_eq!(around([4, 5]), [1, 0], "by the ray the other way, as it does not matter");
+    }
+
+    #[test]
+    fn a_face_exactly_on_a_surface_is_inside_the_body_ahead() {
+        for (z, inside) in [(0.0, true), (-1.0, true), (1.0, false)] {
+            let mut fixture = Fixture::new(vec![tissue(1.5, 1.5, 0.0)]);
+            fixture.block([-20.0, -19.0, z], [21.0, 20.0, z + 8.0], 0, 0);
+            let expected: &[u32] = if inside { &[0] } else { &[] };
+            assert_eq!(origin(&fixture.world()).0[0].media.0, expected, "{z}");
+        }
     }
 
     #[test]
