@@ -1,7 +1,7 @@
 #version 460
 // The aperture's way to a target. A target is lit and heard by an aperture that converges on it; the rays from there cross the
-// paths of neighbouring scanlines, lose what these lose there, and are turned as these are. One thread has a scanline, at some of
-// the nodes of depth.
+// paths of neighbouring scanlines, lose what these lose there, and are turned as these are. One thread has LEVEL_STEP scanlines, at
+// some of the nodes of depth.
 #extension GL_GOOGLE_include_directive : require
 #include "shared.glsl"
 
@@ -193,11 +193,12 @@ void turn(Target target, uint band) {
     }
 }
 
-// Follows the rays from the target up, through what scanlines beside it do differently. False if there is nothing like that.
-bool follow_rays(Target target) {
+// Follows the rays from the target up, through what scanlines beside it do differently, and with `bends` as they are turned. False
+// if there is nothing like that.
+bool follow_rays(Target target, bool bends) {
     for (uint i = 0u; i < APERTURE_RAYS; ++i) lost[i] = missed[i] = aside[i] = 0.0;
     float widest = 0.5 * float(APERTURE_RAYS) * target.spacing, outermost = 0.5 * float(APERTURE_RAYS) * target.deviations;
-    bool found = false, bends = target.node % LEVEL_STEP == 0u;
+    bool found = false;
     uint begin;
     for (uint end = target.node; end > 0u; end = begin) {
         begin = step_above(target.node, end);
@@ -253,13 +254,13 @@ float level_of(Target target) {
 
 // Gain and level of a target. The gain: for each of its apertures the mean over its rays of the part that reaches the target,
 // over that of its own scanline; of the two-way amplitude that main paths carry, one way has the root.
-vec2 converged(uint layer, int l, uint node, uint row) {
+vec2 converged(uint layer, int l, uint node, uint row, bool bends) {
     vec2 halves = vec2(rows[row].transmit_half, rows[row].receive_half);
     float widest = max(halves.x, halves.y);
     float spacing = 2.0 * widest / float(APERTURE_RAYS);
     float deviations = spacing / max(rows[row].receive_sine * frame.depth * float(node) / BAND_COUNT, LEAST_PITCH);
     Target target = Target(layer, l, node, row, spacing, deviations);
-    if (!follow_rays(target)) return vec2(0.0);
+    if (!follow_rays(target, bends)) return vec2(0.0);
     // What would lie beyond the face is no element. A phased array is modelled as a point, its aperture is all there.
     float first = float(frame.first_line) + float(l) + 0.5;
     float at_face = mix(0.0, 1.0 / max(line_pitch().x, LEAST_PITCH), frame.kind != KIND_PHASED);
@@ -277,16 +278,23 @@ vec2 converged(uint layer, int l, uint node, uint row) {
         count += share;
     }
     float gain = log(max(sum.x, 1e-30) / count.x) + log(max(sum.y, 1e-30) / count.y);
-    return vec2(gain, level_of(target));
+    return vec2(gain, bends ? level_of(target) : 0.0);
 }
 
-// False around masks, where nobody hears the scanline: its main path reaches no node between which and this one a gain or a level
-// is interpolated.
-bool is_heard(uint layer, int l, uint node) {
+// False around masks, where nobody hears the scanline: no main path reaches a place for which a gain or a level of this node is
+// interpolated. These lie up to `reach` nodes away, on layers and scanlines fewer than `reach` away.
+bool is_heard(uint layer, uint l, uint node, uint reach) {
     if ((frame.flags & FLAG_MASKED) == 0u) return true;
-    uint first = node - min(node, LEVEL_STEP), last = min(node + LEVEL_STEP, APERTURE_BANDS);
+    uvec3 here = uvec3(layer, l, node), most = uvec3(frame.layers - 1u, frame.scanlines - 1u, APERTURE_BANDS);
+    uvec3 low = here - min(here, uvec3(reach - 1u)), high = min(here + reach - 1u, most);
+    low.z = node - min(node, reach);
+    high.z = min(node + reach, APERTURE_BANDS);
     bool reached = false;
-    for (uint at = first; at <= last; ++at) reached = reached || lost_at(layer, l, at) > UNKNOWN;
+    for (uint at = low.x; at <= high.x; ++at) {
+        for (uint beside = low.y; beside <= high.y; ++beside) {
+            for (uint depth = low.z; depth <= high.z; ++depth) reached = reached || lost_at(at, int(beside), depth) > UNKNOWN;
+        }
+    }
     return reached;
 }
 
@@ -307,15 +315,20 @@ void main() {
         fronts[word] = packed;
     }
     barrier();
-    uint l = gl_WorkGroupID.x * THREADS + thread;
-    if (l >= frame.scanlines) return;
-    uint line = layer * frame.scanlines + l;
-    for (uint node = gl_WorkGroupID.y; node <= APERTURE_BANDS; node += gl_NumWorkGroups.y) {
-        uint row = sample_at(frame.depth * float(node) / (BAND_COUNT * frame.sample_pitch));
-        vec2 found = vec2(0.0);
-        if (is_heard(layer, int(l), node)) found = converged(layer, int(l), node, row);
-        uint at = aperture_at(line, node);
-        apertures[at].gain = found.x;
-        apertures[at].level = found.y;
+    // Of LEVEL_STEP scanlines of a thread the first has levels: all threads do alike at a time.
+    uint first = LEVEL_STEP * (gl_WorkGroupID.x * THREADS + thread) - frame.first_line % LEVEL_STEP;
+    for (uint i = 0u; i < LEVEL_STEP; ++i) {
+        // Below 0 it is beyond all.
+        uint l = first + i;
+        if (l >= frame.scanlines) continue;
+        for (uint node = gl_WorkGroupID.y; node <= APERTURE_BANDS; node += gl_NumWorkGroups.y) {
+            bool bends = i == 0u && node % LEVEL_STEP == 0u && layer % LEVEL_STEP == 0u;
+            uint row = sample_at(frame.depth * float(node) / (BAND_COUNT * frame.sample_pitch));
+            vec2 found = vec2(0.0);
+            if (is_heard(layer, l, node, bends ? LEVEL_STEP : 1u)) found = converged(layer, int(l), node, row, bends);
+            uint at = aperture_at(layer * frame.scanlines + l, node);
+            apertures[at].gain = found.x;
+            apertures[at].level = found.y;
+        }
     }
 }

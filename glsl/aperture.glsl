@@ -30,13 +30,14 @@ float bands_at(float time) {
     return clamp(mix(0.0, time * frame.speed / frame.depth, time > 0.0), 0.0, 1.0) * float(APERTURE_BANDS);
 }
 
-// Two nodes of a line, and where between them a place is; nodes are `step` apart.
+// Two of which something is known, and where between them a place is.
 struct Between {
     uint above;
     uint below;
     float part;   // of the way from the one to the other
 };
 
+// Nodes of a line, of those that are `step` apart.
 Between nodes_at(uint line, float time, uint step) {
     float at = bands_at(time) / float(step);
     uint node = min(uint(whole(floor(at))), APERTURE_BANDS / step - 1u);
@@ -54,8 +55,32 @@ float aperture_nepers(uint line, float time, float lost) {
     return mix(APERTURES[nodes.above].gain, APERTURES[nodes.below].gain, nodes.part);
 }
 
-// Factor on the amplitude of speckle of a line at a one-way time, in nepers, by surfaces that bend its beam.
-float aperture_level(uint line, float time) {
+// Two of `count` scanlines or layers that have levels, between which one lies; LEVEL_STEP divides their numbers from `first` on.
+Between levelled(uint at, uint first, uint count) {
+    uint beyond = (first + at) % LEVEL_STEP;
+    uint next = at + LEVEL_STEP - beyond;
+    if (beyond == 0u || (beyond > at && next >= count)) return Between(at, at, 0.0);
+    if (beyond > at) return Between(next, next, 0.0);
+    uint before = at - beyond;
+    return Between(before, next < count ? next : before, float(beyond) / float(LEVEL_STEP));
+}
+
+float level_between(uint line, float time) {
     Between nodes = nodes_at(line, time, LEVEL_STEP);
     return mix(APERTURES[nodes.above].level, APERTURES[nodes.below].level, nodes.part);
+}
+
+float level_beside(uint layer, Between lines, float time) {
+    float before = level_between(layer * frame.scanlines + lines.above, time);
+    if (lines.part <= 0.0) return before;
+    return mix(before, level_between(layer * frame.scanlines + lines.below, time), lines.part);
+}
+
+// Factor on the amplitude of speckle of a line at a one-way time, in nepers, by surfaces that bend its beam.
+float aperture_level(uint line, float time) {
+    Between lines = levelled(line % frame.scanlines, frame.first_line, frame.scanlines);
+    Between layers = levelled(line / frame.scanlines, 0u, frame.layers);
+    float before = level_beside(layers.above, lines, time);
+    if (layers.part <= 0.0) return before;
+    return mix(before, level_beside(layers.below, lines, time), layers.part);
 }

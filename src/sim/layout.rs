@@ -185,7 +185,8 @@ constants! {
     pub const RAY_WIDTH: f32 = 0.25;
     /// Scanlines turn rays alike in a band if no neighbours' sines differ by more.
     pub const BENT_ALIKE: f32 = 1e-4;
-    /// Nodes from one to the next at which rays that miss a target are followed.
+    /// Nodes, scanlines and layers from one to the next for which rays that miss a target are followed: how bright speckle is in a
+    /// beam that surfaces bend changes no faster.
     pub const LEVEL_STEP: u32 = 2;
     /// Squared distance by which rays miss a target, over the beams' variance, from which on it counts.
     pub const LEAST_MISSED: f32 = 2e-5;

@@ -92,7 +92,9 @@ impl Simulator {
         // Also the tables of settings that this frame is the first to have.
         self.adopt(scene)?;
         let smoothed = smoothed(&self.tables);
-        let reach = smoothed + aperture_reach(scene, &self.tables);
+        // And those beside which have levels.
+        let levelled = layout::LEVEL_STEP - 1;
+        let reach = smoothed + levelled + aperture_reach(scene, &self.tables);
         let line = OneLine { number, rows, reach, smoothed };
         self.make(scene, &[Shot::of(scene, index)], Some(line))?;
         let rgba = self.read_again(pixels(false))?;

@@ -34,7 +34,7 @@ pub struct Passed {
 pub struct Found {
     /// Factor on amplitudes, nepers.
     pub gain: f64,
-    /// Factor on the amplitude of speckle, nepers; of each LEVEL_STEPth node.
+    /// Factor on the amplitude of speckle, nepers; of each LEVEL_STEPth node, scanline of the face and layer.
     pub level: f64,
 }
 
@@ -63,12 +63,36 @@ fn bands(frame: &Frame, time: f64, step: u32) -> (u32, f64) {
     (step * node, way - f64::from(node))
 }
 
-/// Factor on the amplitude of speckle of a line at a one-way time, in nepers, by surfaces that bend its beam.
+/// Factor on the amplitude of speckle of a line at a one-way time, in nepers, by surfaces that bend its beam: between the
+/// nodes, scanlines and layers that have one.
 pub fn level(frame: &Frame, nodes: &[Aperture], line: u32, time: f64) -> f64 {
     let (node, share) = bands(frame, time, LEVEL_STEP);
-    let [above, below] =
-        [node, node + LEVEL_STEP].map(|node| f64::from(nodes[place(frame, line, node)].level));
-    above + share * (below - above)
+    let (layer, l) = (line / frame.scanlines, line % frame.scanlines);
+    let mut sum = 0.0;
+    for (layer, part) in levelled(layer, 0, frame.layers) {
+        for (l, beside) in levelled(l, frame.first_line, frame.scanlines) {
+            let line = layer * frame.scanlines + l;
+            let [above, below] = [node, node + LEVEL_STEP]
+                .map(|node| f64::from(nodes[place(frame, line, node)].level));
+            sum += part * beside * (above + share * (below - above));
+        }
+    }
+    sum
+}
+
+/// Of `count` scanlines or layers those between which one lies and whose numbers, from `first` on, LEVEL_STEP divides, each with
+/// its share. At the border it is one, and where there is none the given one itself.
+fn levelled(at: u32, first: u32, count: u32) -> Vec<(u32, f64)> {
+    let has = |n: &u32| (first + n).is_multiple_of(LEVEL_STEP);
+    let before = (0..=at).rev().find(has);
+    let next = (at..count).find(has);
+    match (before, next) {
+        (Some(before), Some(next)) if before < next => {
+            let part = f64::from(at - before) / f64::from(next - before);
+            vec![(before, 1.0 - part), (next, part)]
+        }
+        _ => vec![(before.or(next).unwrap_or(at), 1.0)],
+    }
 }
 
 /// Factor on amplitudes of a line at a one-way time, in nepers, where its main path has lost `lost` nepers. `at` gives
@@ -124,14 +148,27 @@ struct Target<'a> {
 }
 
 impl Target<'_> {
-    /// False around masks: the main path of scanline `l` reaches neither the node nor one next to it, nor one of those that
-    /// have a level.
+    /// False around masks: no main path reaches a place for which the gain or the level of scanline `l` here is interpolated.
     fn is_heard(&self, l: u32) -> bool {
-        let line = self.layer * self.frame.scanlines + l;
-        let last = (self.node + LEVEL_STEP).min(APERTURE_BANDS);
-        self.frame.flags & FLAG_MASKED == 0
-            || (self.node.saturating_sub(LEVEL_STEP)..=last)
-                .any(|node| self.passed[place(self.frame, line, node)].lost > UNKNOWN)
+        let frame = self.frame;
+        let reach = if self.has_level(l) { LEVEL_STEP } else { 1 };
+        let around =
+            |at: u32, reach: u32, last: u32| at.saturating_sub(reach)..=(at + reach).min(last);
+        let reached = |layer: u32, l: u32| {
+            around(self.node, reach, APERTURE_BANDS).any(|node| {
+                self.passed[place(frame, layer * frame.scanlines + l, node)].lost > UNKNOWN
+            })
+        };
+        frame.flags & FLAG_MASKED == 0
+            || around(self.layer, reach - 1, frame.layers - 1)
+                .any(|layer| around(l, reach - 1, frame.scanlines - 1).any(|l| reached(layer, l)))
+    }
+
+    /// True if rays that miss the target are followed.
+    fn has_level(&self, l: u32) -> bool {
+        [self.node, self.layer, self.frame.first_line + l]
+            .iter()
+            .all(|n| n.is_multiple_of(LEVEL_STEP))
     }
 
     /// Loss of scanline `l` between two nodes; none where it was not followed.
@@ -234,7 +271,7 @@ impl Target<'_> {
             let lose = |band: u32| pairs.clone().any(|l| self.lose_otherwise(l, band));
             let turn = |band: &u32| pairs.clone().any(|l| self.turn_otherwise(l, *band));
             found.losses.extend((step[0]..step[1]).any(lose).then_some(step));
-            if self.node.is_multiple_of(LEVEL_STEP) {
+            if self.has_level(l) {
                 found.turns.extend((step[0]..step[1]).filter(turn));
             }
         }
@@ -287,7 +324,8 @@ impl Target<'_> {
             }
         }
         let gain = sums.iter().zip(counts).map(|(sum, count)| (sum.max(1e-30) / count).ln()).sum();
-        Found { gain, level: self.level(&rays) }
+        let level = if self.has_level(l) { self.level(&rays) } else { 0.0 };
+        Found { gain, level }
     }
 
     /// The ray from `beside` mm beside scanline `l` on the aperture.

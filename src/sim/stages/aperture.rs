@@ -1,6 +1,6 @@
 //! `aperture`: what the aperture that converges on a target lets through, of what the scanline's main path alone loses.
 
-use super::super::layout::{APERTURE_BANDS, Aperture, Frame};
+use super::super::layout::{APERTURE_BANDS, Aperture, Frame, LEVEL_STEP};
 use super::super::pass::{Array, Extent, Pass, Sizes};
 use crate::output::npy::Element::Float;
 
@@ -18,13 +18,17 @@ pub const APERTURE: Pass = Pass {
     ..Pass::USUAL
 };
 
-/// Most work groups among which the nodes of 64 scanlines are dealt out.
+/// Scanlines of a work group.
+const LINES: u32 = 64 * LEVEL_STEP;
+
+/// Most work groups among which the nodes of as many scanlines are dealt out.
 const MOST_GROUPS: u32 = 4;
 
 /// Work groups for a device that runs about `at_once` of them at once: each finds out by itself where scanlines differ, so
 /// that more than keep the device busy are slower.
 pub fn extent(frame: &Frame, at_once: u32) -> Extent {
-    let lines = frame.scanlines.div_ceil(64);
+    // A thread begins with one whose number on the face LEVEL_STEP divides.
+    let lines = (frame.scanlines + frame.first_line % LEVEL_STEP).div_ceil(LINES);
     let groups = at_once / (lines * frame.layers).max(1);
     Extent::Groups([lines, groups.clamp(1, MOST_GROUPS), frame.layers])
 }
