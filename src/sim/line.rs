@@ -41,7 +41,8 @@ impl OneLine {
     }
 }
 
-/// Scanlines on each side that an aperture reaches over, at most, at any depth in front of a target.
+/// Scanlines on each side that what the aperture lets through depends on, at most: those that it reaches over, at any depth in
+/// front of a target.
 fn aperture_reach(scene: &Scene, tables: &Tables) -> u32 {
     if !scene.simulation.loses_by_aperture() {
         return 0;
@@ -59,7 +60,9 @@ fn aperture_reach(scene: &Scene, tables: &Tables) -> u32 {
         let behind = deviations * defocus.abs() / probe.line_pitch(depth);
         (widest.max(sent) / pitch).max(behind)
     });
-    reached.fold(0.0, f64::max).ceil().min(f64::from(probe.scanlines)) as u32
+    // A line between two that have levels takes theirs.
+    let levelled = layout::LEVEL_STEP - 1;
+    reached.fold(0.0, f64::max).ceil().min(f64::from(probe.scanlines)) as u32 + levelled
 }
 
 /// Scanlines on each side over which `beam` smooths, at most, with these tables.
@@ -92,9 +95,7 @@ impl Simulator {
         // Also the tables of settings that this frame is the first to have.
         self.adopt(scene)?;
         let smoothed = smoothed(&self.tables);
-        // And those beside which have levels.
-        let levelled = layout::LEVEL_STEP - 1;
-        let reach = smoothed + levelled + aperture_reach(scene, &self.tables);
+        let reach = smoothed + aperture_reach(scene, &self.tables);
         let line = OneLine { number, rows, reach, smoothed };
         self.make(scene, &[Shot::of(scene, index)], Some(line))?;
         let rgba = self.read_again(pixels(false))?;
