@@ -1,6 +1,7 @@
 //! Twin of `origin`: the media that enclose the start of each line, and the place where its paths begin.
 
 use super::geometry::world_line;
+use super::path::step;
 use super::stack::Stack;
 use super::straight::Start;
 use super::world::{Crossing, World};
@@ -18,7 +19,7 @@ pub fn origin(world: &World) -> (Vec<Start>, u32) {
             let line = world_line(world.frame, l, e);
             let mut crossings = world.crossings(line.origin, line.direction, [0.0, f64::INFINITY]);
             crossings.truncate(CROSSINGS);
-            let close = 4e-6 * line.origin.abs().max_element().max(1.0);
+            let close = step(line.origin);
             let ahead = line.origin + close * line.direction;
             let behind = world.crossings(ahead, -line.direction, [0.0, f64::INFINITY]);
             let unsure = behind.first().is_some_and(|c| c.t < 2.0 * close);
