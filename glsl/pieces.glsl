@@ -18,10 +18,9 @@ uvec2 hear(Stretch s, vec3 rel, float strength, int number, vec2 x, float drowne
     uint row = row_at(kappa);
     float across = dot(rel, s.e_l);
     vec4 shape = rows[row].shape;
-    if (!(half_width(s, shape, along) > 0.0)) return uvec2(0u);
+    if (!(abs(across) < half_width(s, row, along))) return uvec2(0u);
     float share = strip_share(across, shape.x, rows[row].strip_core, strip_ratio(s, along));
-    if (!(share > 0.0)) return uvec2(0u);
-    float power = level_power(wanted_level(s.tissue, shape.w, drowned), number);
+    float power = level_power(wanted_at(s, row, along, drowned), number);
     if (!(power > 0.0)) return uvec2(0u);
     up += s.layer_y;
     float exponent = rows[row_at(kappa + 0.5)].shape.z - s.absorption * LOG2_E * along - shape.y * up * up;
@@ -31,7 +30,7 @@ uvec2 hear(Stretch s, vec3 rel, float strength, int number, vec2 x, float drowne
 }
 
 // Scatterers of one lattice of deformed tissue between two distances. Cells are found where the piece lies
-// in the reference shape: by the affine map at its middle, widened by the map's error. Each scatterer
+// in the reference shape: by the affine map at its middle, in a box that the map's error widens. Each scatterer
 // then echoes from its true place, in the piece that holds it.
 uvec3 march_piece(Stretch s, int number, vec2 x, float drowned) {
     Lattice lattice = lattice_of(s.tissue, number);
@@ -48,27 +47,34 @@ uvec3 march_piece(Stretch s, int number, vec2 x, float drowned) {
     if (!(width > 0.0)) return uvec3(0u);
     float reach = slab_of().y;
 
-    // Error of the affine map at the corners, half as much again for the points between them.
-    vec3 d = bounded(undeform(jacobian, s.d)), el = bounded(undeform(jacobian, s.e_l)), ee = bounded(undeform(jacobian, s.e_e));
-    float miss = 0.0;
-    for (uint i = 0u; i < 8u; ++i) {
-        vec3 side = (2.0 * vec3(i & 1u, (i >> 1u) & 1u, i >> 2u) - 1.0) * vec3(half_length, width, reach);
-        vec3 there = here + side.x * s.d + side.y * s.e_l + side.z * s.e_e;
-        miss = max(miss, length(displaced(f, middle + side.x * d + side.y * el + side.z * ee) - there));
-    }
-    miss = min(1.5 * miss + 1e-3 * h, half_length + reach);
-
     vec3 along = s.d * jacobian, across = s.e_l * jacobian, up = s.e_e * jacobian;
+    // Where scatterers of the piece may lie by the affine map: it differs from the true one as at the corners, and half as much
+    // of its range again between them. What is the same at all corners shifts the middle.
+    vec3 d = bounded(undeform(jacobian, s.d)), el = bounded(undeform(jacobian, s.e_l)), ee = bounded(undeform(jacobian, s.e_e));
+    vec3 half_size = vec3(half_length, width, reach);
+    vec3 least = vec3(0.0), most = vec3(0.0);
+    for (uint i = 0u; i < 8u; ++i) {
+        vec3 side = (2.0 * vec3(i & 1u, (i >> 1u) & 1u, i >> 2u) - 1.0) * half_size;
+        vec3 off = side.x * d + side.y * el + side.z * ee;
+        vec3 moved = displaced(f, middle + off) - here;
+        vec3 miss = vec3(dot(moved, s.d) - dot(off, along), dot(moved, s.e_l) - dot(off, across), dot(moved, s.e_e) - dot(off, up));
+        least = min(least, miss);
+        most = max(most, miss);
+    }
+    vec3 shift = -0.5 * (least + most);
+    vec3 half_box = half_size + min(most - least + 1e-3 * h, vec3(half_length + reach));
+    vec3 centre = middle + shift.x * d + shift.y * el + shift.z * ee;
+
     Walk walk = walk_of(along, across, up);
-    float high = reach + miss + 0.51 * h * dot(abs(up), vec3(1.0));
-    float wide = width + miss + 0.51 * h * dot(abs(across), vec3(1.0));
+    float high = half_box.z + 0.51 * h * dot(abs(up), vec3(1.0));
+    float wide = half_box.y + 0.51 * h * dot(abs(across), vec3(1.0));
     // Along the beam, within the slab's middle plane.
-    float deep = half_length + miss + 0.51 * h * dot(abs(along), vec3(1.0)) + high * abs(along[walk.c] * walk.inverse_c);
+    float deep = half_box.x + 0.51 * h * dot(abs(along), vec3(1.0)) + high * abs(along[walk.c] * walk.inverse_c);
     float far = deep + (wide + high * abs(walk.slant)) * abs(walk.along.y / walk.across.y);
     float row_slope = 1.0 / at_least(walk.along.y, 1e-4);
 
-    vec3 nearest = floor(middle * inverse_h);
-    vec3 rest = fma(-nearest, vec3(h), middle);
+    vec3 nearest = floor(centre * inverse_h);
+    vec3 rest = fma(-nearest, vec3(h), centre);
     ivec3 base = ivec3(nearest);
     // Squeezed tissue keeps its echo level though its scatterers are closer together.
     float growth = abs(dot(jacobian[0], cross(jacobian[1], jacobian[2])));
@@ -108,9 +114,9 @@ uvec3 march_piece(Stretch s, int number, vec2 x, float drowned) {
                 rel = (vec3(at) + vec3(unit(bits.x), unit(bits.y), unit(bits.z))) * h - rest;
                 vec3 about = abs(vec3(dot(rel, along), dot(rel, across), dot(rel, up)));
                 signed_strength = mix(-strength, strength, (bits.z & 1u) == 0u);
-                found = counts && present(lattice, bits) && all(lessThanEqual(about, vec3(half_length, width, reach) + miss));
+                found = counts && present(lattice, bits) && all(lessThanEqual(about, half_box));
             }
-            if (found) count.yz += hear(s, displaced(f, middle + rel) - s.o, signed_strength, number, x, drowned);
+            if (found) count.yz += hear(s, displaced(f, centre + rel) - s.o, signed_strength, number, x, drowned);
         }
     }
     return count;

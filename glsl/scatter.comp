@@ -47,7 +47,6 @@ const uint BINS = SCATTER_WINDOW / SCATTER_BIN;
 const int BESIDE = 2;                     // bins on each side whose scatterers may echo in the window
 const uint SLOTS = SCATTER_BIN / SCATTER_SLOT;    // per bin
 const int SLOTS_BESIDE = BESIDE * int(SLOTS);
-const uint PIECES = SCATTER_BIN / SCATTER_PIECE;  // per bin, in deformed tissue
 const float LEVEL_UNIT = 65536.0;         // integers per unit of level, for comparisons
 const int SILENT = -0x40000000;
 
@@ -73,6 +72,9 @@ Stretch texture_stretch(uint at) {
 }
 
 bool deforms(Stretch s) { return DEFORMING && field_of(s.instance) != NONE; }
+
+// Parts of a bin that are searched one by one: in deformed tissue, several.
+uint items_of(Stretch s) { return deforms(s) ? SCATTER_BIN / frame.piece : 1u; }
 
 // The slab of a layer about its middle, mm. Borders of layers avoid the round numbers at which cells have their
 // centres: by rounding a cell could belong to two layers or to none.
@@ -109,18 +111,34 @@ uint deposit_near(float kappa, vec2 v) {
     return saturated;
 }
 
-// Half the strip's width for the shape of a row, at distance x, mm; 0 where the whole layer lies beyond the beam's edge in elevation.
-float half_width(Stretch s, vec4 shape, float x) {
+// True if the strip is a narrow beam's, of which no other scanline hears scatterers.
+bool is_narrow(uint row) { return rows[row].strip_core < 0.0; }
+
+// Half the strip's width at distance x, whose row is given, mm; 0 where the whole layer lies beyond the beam's edge in elevation.
+// A narrow beam's section is an ellipse, of which the edge of the layer nearest to the middle is taken.
+float half_width(Stretch s, uint row, float x) {
+    vec4 shape = rows[row].shape;
     float nearest = max(abs(s.layer_y) - frame.elevation_reach, 0.0) / frame.elevation_cut;
-    return INVERSE_FALL * shape.y * nearest * nearest < 1.0 ? shape.x * strip_ratio(s, x) : 0.0;
+    float within = 1.0 - INVERSE_FALL * shape.y * nearest * nearest;
+    if (!(within > 0.0)) return 0.0;
+    return shape.x * strip_ratio(s, x) * (is_narrow(row) ? sqrt(within) : 1.0);
+}
+
+// Lattice level wanted at distance x, whose row is given. A narrow beam that is wider needs fewer scatterers; in strips that
+// scanlines share they must be the same ones.
+float wanted_at(Stretch s, uint row, float x, float drowned) {
+    float level = rows[row].shape.w;
+    if (is_narrow(row) && level > ALL_LEVELS) level += max(log2(strip_ratio(s, clamp(x, 0.0, s.extent))), 0.0);
+    return wanted_level(s.tissue, level, drowned);
 }
 
 // How far a scatterer may lie from the middle of its cell, of edge h, in a direction e of the lattice's space.
 float jitter(float h, vec3 e) { return 0.5 * h * dot(abs(e), vec3(1.0)); }
 
 // Echoes of the scatterers of one lattice near a stretch, plane by plane. x: range of the distances of crossed planes
-// that belong to this work. A cell counts if its centre is within the layer's slab; its scatterer, if it is within
-// the strip and within the stretch's ends. What varies slowly is that of the place where the axis crosses the plane's middle.
+// that belong to this work. A cell counts if its centre is within the layer's slab and, of a narrow beam, within its width; its
+// scatterer, if it is within the stretch's ends and the strip of others. What varies slowly is that of the place where the axis
+// crosses the plane's middle.
 uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
     Lattice lattice = lattice_of(s.tissue, number);
     Walk walk = walk_of(s.d, s.e_l, s.e_e);
@@ -154,10 +172,9 @@ uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
         float ahead = walk.step * da;         // distance from the middle to where the axis crosses the plane
         uint row = row_at(kappa_middle + ahead * per_mm);
         vec4 shape = rows[row].shape;
-        float wanted = wanted_level(s.tissue, shape.w, drowned);
-        float power = level_power(wanted, number);
         float x_plane = x_middle + ahead;
-        float width = half_width(s, shape, x_plane);
+        float power = level_power(wanted_at(s, row, x_plane, drowned), number);
+        float width = half_width(s, row, x_plane);
         if (!(power > 0.0) || !(width > 0.0)) continue;
 
         // Over the plane the beam's shape and the gain vary as a parabola through samples on both sides.
@@ -169,8 +186,8 @@ uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
         // The values of a row belong to the middle of its sample.
         float row_ahead = (float(row) + 0.5 - kappa_middle) * mm_per_sample;
 
-        vec2 profile = strip_profile(rows[row].strip_core);
-        float reach = 1.05 * width + beside;
+        vec3 profile = strip_profile(rows[row].strip_core);
+        float reach = is_narrow(row) ? width : 1.05 * width + beside;
         float strength = lattice.amplitude * sqrt(power) * s.weight * thinning(s, x_plane, row) * frame.volume_scale;
         strength *= scattered(s, clamp(x_plane, 0.0, s.extent), row);
         if (depth > 0.0) {
@@ -200,14 +217,14 @@ uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
             vec3 change = off_row * (slope + off_row * bend);
             float ratio = strip_ratio(s, along);
             float off = abs(dot(rel, s.e_l)) / (max(here.x + change.x, LEAST_PITCH) * ratio);
-            float share = min((1.0 - off) * profile.x, 1.0);
+            float share = min(profile.x + (1.0 - off) * profile.y, 1.0);
             // One branch, as many threads of a group have none of it.
             if (!(counts && present(lattice, bits) && along >= 0.0 && along < s.extent && share > 0.0)) continue;
             float up = s.layer_y + dot(rel, s.e_e);
             // An echo on a sample has the gain of the sample's row.
             float off_gain = off_row + 0.5 * mm_per_sample;
             change.z = off_gain * (slope.z + off_gain * bend.z);
-            float exponent = constant + change.z - falling * dx - (here.y + change.y) * up * up - profile.y * off * off;
+            float exponent = constant + change.z - falling * dx - (here.y + change.y) * up * up - profile.z * off * off;
             vec2 v = strength * share * inversesqrt(ratio) * exp2(exponent) * phasor(-(turns_middle + dx * turns_per_mm));
             v *= mix(-1.0, 1.0, (bits.z & 1u) == 0u);
             count.y += 1u;
@@ -220,7 +237,7 @@ uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
 // Half the strip's width at the wider end of a piece.
 float end_width(Stretch s, vec2 x) {
     uvec2 row = uvec2(row_at(kappa_at(s, x.x)), row_at(kappa_at(s, x.y)));
-    return max(half_width(s, rows[row.x].shape, x.x), half_width(s, rows[row.y].shape, x.y));
+    return max(half_width(s, row.x, x.x), half_width(s, row.y, x.y));
 }
 
 // Largest distance along the beam between a cell's scatterer and the crossing of its plane.
@@ -254,8 +271,8 @@ uvec3 march_bin(Stretch s, int bin, int piece) {
     uint end = begin + SCATTER_BIN;
     bool field = deforms(s);
     if (field) {
-        begin += uint(piece) * SCATTER_PIECE;
-        end = begin + SCATTER_PIECE;
+        begin += uint(piece) * frame.piece;
+        end = begin + frame.piece;
     }
     vec2 x = vec2(distance_at(s, float(begin)), distance_at(s, float(end)));
     // The first and the last bin also have what lies before the first and behind the last sample.
@@ -265,11 +282,15 @@ uvec3 march_bin(Stretch s, int bin, int piece) {
     if (!(x.y > x.x)) return uvec3(0u);
 
     // Levels that some plane may need. Between the rows looked up they differ by a twentieth of a level at most.
+    // Where paths cross, a strip is narrowest between them.
+    bool crosses = (s.strip.x + x.x * s.strip.y) * (s.strip.x + x.y * s.strip.y) < 0.0;
     float lowest = 1e9, highest = -1e9;
     int spans = clamp(whole(ceil(min((x.y - x.x) / LEVEL_SPAN, 64.0))), 2, 64);
     for (int i = 0; i <= spans; ++i) {
-        float wanted = wanted_level(s.tissue, rows[row_at(kappa_at(s, mix(x.x, x.y, float(i) / float(spans))))].shape.w, drowned);
-        lowest = min(lowest, wanted);
+        float there = mix(x.x, x.y, float(i) / float(spans));
+        uint row = row_at(kappa_at(s, there));
+        float wanted = wanted_at(s, row, there, drowned);
+        lowest = min(lowest, crosses ? wanted_level(s.tissue, rows[row].shape.w, drowned) : wanted);
         highest = max(highest, wanted);
     }
     int number = whole(floor(max(lowest - 0.05, 0.0)));
@@ -309,7 +330,7 @@ ivec2 work_of(Stretch s, bool voxel) {
     int window = int(window_begin / SCATTER_BIN);
     int first = max(passed.x, window - BESIDE);
     int last = min(passed.y, window + int(BINS) + BESIDE - 1);
-    int items = deforms(s) ? int(PIECES) : 1;
+    int items = int(items_of(s));
     return ivec2(first * items, max(last - first + 1, 0) * items);
 }
 
@@ -375,7 +396,7 @@ void main() {
             if (voxel) {
                 count += march_sample(s, index);
             } else {
-                int items = deforms(s) ? int(PIECES) : 1;
+                int items = int(items_of(s));
                 count += march_bin(s, index / items, index % items);
             }
         }

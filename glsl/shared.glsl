@@ -99,7 +99,6 @@ const uint SCATTER_WINDOW = 1024u;  // samples that one workgroup of scatter gat
 const uint SCATTER_BIN = 64u;       // samples of a stretch for which one thread of scatter works
 const uint SCATTER_SLOT = 16u;      // samples over which the levels of stretches are compared
 const float LEAST_GROWTH = 0.05;    // smallest relative volume of squeezed tissue, largest is its inverse; a coarse field may exceed both
-const uint SCATTER_PIECE = 32u;     // samples for which deformed tissue is searched together
 const float SAMPLE_BLEND = 0.0625;  // fraction of a sample, halfway between two, in which both get a share of a scatterer
 const uint POINT_GROUP = 8u;        // point targets that share a bounding sphere
 const float UNHEARD = 3.3219281;    // log2(10): what is more than 20 dB below black is not summed
@@ -131,7 +130,8 @@ struct Frame {
     uint couplant;
     uint first_line; uint lines_beside;   // number on the face of the first scanline made; scanlines of the face not made
     uint echo_first; uint echo_lines;     // of those made, the ones that echo: the others say only what sound loses there
-    uint unused0; uint unused1;
+    uint piece;                           // samples of a bin for which deformed tissue is searched together
+    uint unused0;
 };
 
 // A scanline in probe space: its start (mm, without elevation) and its

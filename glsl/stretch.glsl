@@ -135,11 +135,11 @@ float scattered(Stretch s, float x, uint row) {
     return sqrt(spoiled(s, x, row));
 }
 
-// How a scanline hears scatterers over its strip: what it hears falls linearly by x from the strip's edge to its middle, up to all
-// of it, and by y log2 over its width as the square of the distance. `core` is the share that is heard whole; below 0 the strip is
-// a Gaussian, that of a beam narrower than what lines could share.
-vec2 strip_profile(float core) {
-    return core < 0.0 ? vec2(1e30, 0.5 * LOG2_E * STRIP_CUT * STRIP_CUT) : vec2(1.0 / (1.0 - core), 0.0);
+// How a scanline hears scatterers over its strip: x at the strip's edge, by y more in its middle, up to all of it, and by z log2
+// less over its width as the square of the distance. `core` is the share that is heard whole; below 0 the strip is a Gaussian,
+// that of a beam narrower than what lines could share.
+vec3 strip_profile(float core) {
+    return core < 0.0 ? vec3(1.0, 0.0, 0.5 * LOG2_E * STRIP_CUT * STRIP_CUT) : vec3(0.0, 1.0 / (1.0 - core), 0.0);
 }
 
 // The part of a scatterer's amplitude that a scanline hears `across` mm beside its path, in a strip `wide` to either side where
@@ -147,9 +147,9 @@ vec2 strip_profile(float core) {
 // leave a strip `ratio` times as wide it has more scatterers, and hears each more weakly.
 float strip_share(float across, float wide, float core, float ratio) {
     float off = abs(across) / (wide * ratio);
-    vec2 profile = strip_profile(core);
+    vec3 profile = strip_profile(core);
     if (!(off < 1.0)) return 0.0;
-    return min((1.0 - off) * profile.x, 1.0) * exp2(-profile.y * off * off) * inversesqrt(ratio);
+    return min(profile.x + (1.0 - off) * profile.y, 1.0) * exp2(-profile.z * off * off) * inversesqrt(ratio);
 }
 
 // Level of its speckle at distance x: one-way weight times echogenicity, log2.

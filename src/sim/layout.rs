@@ -90,8 +90,6 @@ constants! {
     pub const SCATTER_WINDOW: u32 = 1024;
     /// Samples of a stretch for which one thread of `scatter` works.
     pub const SCATTER_BIN: u32 = 64;
-    /// Samples for which deformed tissue is searched together.
-    pub const SCATTER_PIECE: u32 = 32;
     /// Smallest fraction of its volume to which tissue is taken to be squeezed; the largest is its inverse. A coarse
     /// field may have values beyond.
     pub const LEAST_GROWTH: f32 = 0.05;
@@ -255,7 +253,7 @@ shared! {
         image_width: u32, image_height: u32, pixel_pitch: f32, image_left: f32,
         image_top: f32, beam_width: f32, emission_lobe: f32, ray_mask: u32,
         branch_floor: f32, couplant: u32, first_line: u32, lines_beside: u32,
-        echo_first: u32, echo_lines: u32, unused0: u32, unused1: u32,
+        echo_first: u32, echo_lines: u32, piece: u32, unused0: u32,
     }
     /// Start and direction of a scanline, in probe space; the last entry is the edge of the face.
     struct Scanline { x: f32, z: f32, sine: f32, cosine: f32 }

@@ -15,6 +15,9 @@ use crate::settings::{
 /// Lower limit of the weights of paths. The kernel ends a path by setting its weight to 0, which has to be
 /// below every limit.
 const LEAST_WEIGHT: f32 = 1e-30;
+/// Largest depth over which deformed tissue is searched together, mm: as far as a heart's field is nearly affine, whose nodes are
+/// four to five apart.
+const PIECE_LENGTH: f64 = 5.5;
 /// Level of an amplitude twice as large, dB.
 const DECIBEL_PER_OCTAVE: f64 = 6.020_599_913;
 
@@ -116,8 +119,20 @@ fn constants(
         image_left: (-f64::from(image_width) * pixel_pitch / 2.0) as f32,
         image_top: top as f32,
         echo_lines: probe.scanlines,
+        piece: piece(probe.sample_pitch()),
         ..layout::Frame::default()
     }
+}
+
+/// Samples of a bin of `scatter` for which deformed tissue is searched together, a power of two: as many as lie within
+/// [`PIECE_LENGTH`] at this pitch of samples, mm, but eight at least, as each search has to be prepared.
+pub fn piece(sample_pitch: f64) -> u32 {
+    let most = layout::SCATTER_BIN;
+    let fitting = |samples: &u32| f64::from(*samples) * sample_pitch <= PIECE_LENGTH;
+    std::iter::successors(Some(most), |samples| Some(samples / 2))
+        .take_while(|&samples| samples >= 8)
+        .find(fitting)
+        .unwrap_or(8)
 }
 
 /// The tables that stay the same from frame to frame, in the device's layout.

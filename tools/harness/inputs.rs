@@ -113,6 +113,12 @@ pub fn frame(case: Case, size: Size) -> Frame {
         first_line: if case == Case::Odd { 3 } else { 0 },
         lines_beside: if case == Case::Odd { 9 } else { 0 },
         echo_lines: scanlines,
+        // Some pieces have a bin, some an eighth of one.
+        piece: match case {
+            Case::Odd => 64,
+            Case::Modes => 8,
+            _ => 32,
+        },
         image_width: 1,
         image_height: 1,
         pixel_pitch: 0.25,
@@ -152,7 +158,7 @@ pub fn rows(frame: &Frame) -> Vec<Row> {
                 aperture: 0.1 - 0.0005 * depth,
                 strip_lines: 0.02 + 0.05 * depth,
                 // Narrow beams at every eighth sample.
-                strip_core: if k % 8 == 5 { -1.0 } else { 0.8 - 0.01 * depth },
+                strip_core: if k % 200 / 50 == 2 { -1.0 } else { 0.8 - 0.01 * depth },
                 lobe: 10.0 + 0.2 * depth,
                 transmit_half: (0.21 * depth).min(7.13),
                 receive_half: 0.173 * depth,

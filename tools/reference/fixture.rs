@@ -75,6 +75,7 @@ impl Fixture {
                 volume_scale: 1.0,
                 segment_capacity: 1000,
                 face_height: 6.0,
+                piece: 32,
                 ..Frame::default()
             },
             rows: vec![row; samples as usize],

@@ -308,19 +308,19 @@ impl<'a> Tube<'a> {
         ((distance + x * wider).abs() / nominal.max(LEAST_PITCH.into())).clamp(1.0 / limit, limit)
     }
 
-    /// Half the strip's width at sample `k`, mm; 0 where the whole layer lies beyond the beam's edge in elevation.
-    fn half_width(&self, k: usize) -> f64 {
-        let row = &self.world.rows[k];
-        if self.is_beyond(row) {
-            return 0.0;
-        }
-        f64::from(row.shape[0]) * self.ratio(self.distance(k as f64 + 0.5))
+    /// Half the strip's width at distance `x`, whose row is given, mm; 0 where the whole layer lies beyond the beam's edge in
+    /// elevation. A narrow beam's section is an ellipse, of which the edge of the layer nearest to the middle is taken.
+    fn half_width(&self, row: &Row, x: f64) -> f64 {
+        let frame = self.world.frame;
+        let nearest = (self.layer_offset.abs() - f64::from(frame.elevation_reach)).max(0.0);
+        let beside = nearest / (f64::from(frame.elevation_cut) * f64::from(row.sigma_elevation));
+        let part = if is_narrow(row) { (1.0 - beside * beside).max(0.0).sqrt() } else { 1.0 };
+        if beside < 1.0 { part * f64::from(row.shape[0]) * self.ratio(x) } else { 0.0 }
     }
 
-    fn is_beyond(&self, row: &Row) -> bool {
-        let frame = self.world.frame;
-        let nearest = self.layer_offset.abs() - f64::from(frame.elevation_reach);
-        nearest >= f64::from(frame.elevation_cut) * f64::from(row.sigma_elevation)
+    /// [`Self::half_width`] at the middle of sample `k`.
+    fn half_width_at(&self, k: usize) -> f64 {
+        self.half_width(&self.world.rows[k], self.distance(k as f64 + 0.5))
     }
 
     /// Adds the echo at `from` the tube's origin; `amplitude` is without absorption and `beam`. Without a `gain` it is that of
@@ -390,14 +390,18 @@ impl<'a> Tube<'a> {
     }
 }
 
-/// The part of a scatterer's amplitude that is heard at `off` of half the strip's width.
+/// True if the strip is a narrow beam's, of which no other scanline hears scatterers.
+fn is_narrow(row: &Row) -> bool {
+    row.strip_core < 0.0
+}
+
+/// The part of a scatterer's amplitude that is heard at `off` of half the strip's width, of narrow beams at any distance.
 fn strip_share(row: &Row, off: f64) -> f64 {
     let core = f64::from(row.strip_core);
     let deviations = f64::from(STRIP_CUT) * off;
-    match core < 0.0 {
-        _ if off >= 1.0 => 0.0,
+    match is_narrow(row) {
         true => (-deviations * deviations / 2.0).exp(),
-        false => ((1.0 - off) / (1.0 - core)).min(1.0),
+        false => ((1.0 - off) / (1.0 - core)).clamp(0.0, 1.0),
     }
 }
 

@@ -2,11 +2,11 @@
 
 use glam::{DVec2, DVec3, I64Vec3};
 
-use super::{Deformed, Loudest, Tube, in_row};
+use super::{Deformed, Loudest, Tube, in_row, is_narrow};
 use crate::reference::Accumulator;
 use crate::reference::lattice::{Level, level_power, wanted_level};
 use crate::reference::texture::factor;
-use insonify::sim::layout::{LATTICE_LEVELS, LEAST_GROWTH, SCATTER_BIN, SCATTER_PIECE};
+use insonify::sim::layout::{ALL_LEVELS, LATTICE_LEVELS, LEAST_GROWTH, SCATTER_BIN};
 
 /// The enumeration of a lattice under a beam: axis `a` along it, `b` across, `c` through the slab of the layer.
 struct Walk {
@@ -73,13 +73,19 @@ impl Tube<'_> {
 
     /// Share of the power of lattice `number` at distance `x`, which lies in `bin`.
     fn power(&self, number: u32, x: f64, bin: u32, loudest: &Loudest, out: &Accumulator) -> f64 {
-        let wanted = self.row(x, out).shape[3].into();
+        let row = self.row(x, out);
+        let on = x.clamp(0.0, self.segment.length);
+        // A narrow beam that is wider needs fewer scatterers, as no other scanline hears them.
+        let wider = if is_narrow(row) { self.ratio(on).log2().max(0.0) } else { 0.0 };
+        let level = f64::from(row.shape[3]);
+        let wanted = if level > ALL_LEVELS.into() { level + wider } else { level };
         let drowned = self.drowned(bin, loudest, out);
         drowned.map_or(0.0, |d| level_power(wanted_level(self.tissue, wanted, d), number))
     }
 
-    /// Echoes of one lattice, plane by plane. A cell counts if its centre lies within the layer's slab; its scatterer, if it
-    /// lies within the strip and within the segment's ends.
+    /// Echoes of one lattice, plane by plane. A cell counts if its centre lies within the layer's slab and, of a narrow beam,
+    /// within its width where the axis crosses the plane's middle; its scatterer, if it lies within the segment's ends and the
+    /// strip of others.
     fn planes(&self, number: u32, level: &Level, loudest: &Loudest, out: &mut Accumulator) {
         if self.bins(out).is_empty() {
             return;
@@ -92,7 +98,8 @@ impl Tube<'_> {
         let drift = walk.across.x / walk.across.y;
         let step = walk.along.x - walk.along.y * drift;
         // Larger than the distance of any cell's scatterer from the crossing of its plane.
-        let widest = (0..self.world.rows.len()).fold(0.0, |w, k| f64::max(w, self.half_width(k)));
+        let widest =
+            (0..self.world.rows.len()).fold(0.0, |w, k| f64::max(w, self.half_width_at(k)));
         let margin = 2.0 * h + 2.0 * widest + 2.0 * reach;
         let ends = [-margin, self.segment.length + margin].map(|x| o[a] + x / step);
         let ends = [ends[0].min(ends[1]), ends[0].max(ends[1])];
@@ -103,12 +110,13 @@ impl Tube<'_> {
             let bins = self.bins(out);
             let bin = self.bin(on, out).clamp(bins.start, bins.end - 1);
             let power = self.power(number, x, bin, loudest, out);
-            if power == 0.0 || self.is_beyond(self.row(x, out)) {
+            let row = self.row(x, out);
+            let half = self.half_width(row, x);
+            if power == 0.0 || half == 0.0 {
                 continue;
             }
-            let row = self.row(x, out);
             // A scatterer may lie as far as its cell's corner from its middle.
-            let width = 1.2 * self.half_width(self.sample(x, out)) + h;
+            let width = 1.2 * half + h;
             let strength =
                 self.weight(x, row) * power.sqrt() * factor(self.tissue, o + x * self.direction);
             let row_middle = o[b] - drift * da;
@@ -118,6 +126,11 @@ impl Tube<'_> {
                 let middle = o[c] - walk.tilt.dot(DVec2::new(da, db));
                 let slab = self.slab().map(|up| middle + up / self.elevation[c]);
                 for k in cells([slab[0].min(slab[1]), slab[0].max(slab[1])], h) {
+                    let up = ((k as f64 + 0.5) * h - middle) * self.elevation[c];
+                    let across = walk.across.dot(DVec2::new(da, db)) + walk.slant * up;
+                    if is_narrow(row) && across.abs() > half {
+                        continue;
+                    }
                     let mut cell = I64Vec3::ZERO;
                     (cell[a], cell[b], cell[c]) = (i, j, k);
                     let Some(s) = level.scatterer(cell) else {
@@ -151,12 +164,13 @@ impl Tube<'_> {
         let h = level.edge;
         let reach = f64::from(self.world.frame.elevation_reach);
         for bin in self.bins(out) {
-            for piece in 0..SCATTER_BIN / SCATTER_PIECE {
-                let begin = bin * SCATTER_BIN + piece * SCATTER_PIECE;
-                let ends = [begin, begin + SCATTER_PIECE].map(|k| self.distance(f64::from(k)));
+            let samples = self.world.frame.piece;
+            for piece in 0..SCATTER_BIN / samples {
+                let begin = bin * SCATTER_BIN + piece * samples;
+                let ends = [begin, begin + samples].map(|k| self.distance(f64::from(k)));
                 // The first and the last piece also have what lies before the first and behind the last sample.
                 let first = if begin == 0 { f64::NEG_INFINITY } else { ends[0] };
-                let last = if begin + SCATTER_PIECE >= self.world.frame.samples {
+                let last = if begin + samples >= self.world.frame.samples {
                     f64::INFINITY
                 } else {
                     ends[1]
@@ -172,7 +186,7 @@ impl Tube<'_> {
                     continue;
                 }
                 let middle = self.origin + x0.midpoint(x1) * self.direction;
-                let rows = [x0, x1].map(|x| self.half_width(self.sample(x, out)));
+                let rows = [x0, x1].map(|x| self.half_width(self.row(x, out), x));
                 let half = [1.1 * rows[0].max(rows[1]), 1.1 * reach];
                 let radius = DVec3::new((x1 - x0) / 2.0, half[0], half[1]).length();
                 let (back, spread) = deformed.back(middle, radius);
@@ -200,7 +214,7 @@ impl Tube<'_> {
                             }
                             let row = self.row(x, out);
                             let [low, high] = self.slab();
-                            if self.is_beyond(row)
+                            if from.dot(self.lateral).abs() >= self.half_width(row, x)
                                 || !(low..high).contains(&from.dot(self.elevation))
                             {
                                 continue;
