@@ -361,3 +361,11 @@ fn tgc_adds_sliders_to_the_limited_curve() {
     assert!((at(k) - 35.0 - slider).abs() < 1e-4, "{}", at(k));
     assert!((decibel(f64::from(rows[2047].compensation)) - 35.0).abs() < 1e-4);
 }
+
+/// Deformed tissue is searched over 5.5 mm at most, in parts of a bin of at least eight samples, whatever the pitch of samples.
+#[test]
+fn pieces_of_deformed_tissue_are_as_long_in_every_resolution() {
+    let samples = [2048.0, 1024.0, 512.0, 300.0].map(|count| tables::piece(165.0 / count));
+    assert_eq!(samples, [64, 32, 16, 8]);
+    assert_eq!([tables::piece(0.0), tables::piece(f64::INFINITY), tables::piece(10.0)], [64, 8, 8]);
+}
