@@ -127,12 +127,9 @@ fn constants(
 /// Samples of a bin of `scatter` for which deformed tissue is searched together, a power of two: as many as lie within
 /// [`PIECE_LENGTH`] at this pitch of samples, mm, but eight at least, as each search has to be prepared.
 pub fn piece(sample_pitch: f64) -> u32 {
-    let most = layout::SCATTER_BIN;
-    let fitting = |samples: &u32| f64::from(*samples) * sample_pitch <= PIECE_LENGTH;
-    std::iter::successors(Some(most), |samples| Some(samples / 2))
-        .take_while(|&samples| samples >= 8)
-        .find(fitting)
-        .unwrap_or(8)
+    let fits = |samples: &u32| f64::from(*samples) * sample_pitch <= PIECE_LENGTH;
+    let halved = [1, 2, 4].map(|parts| layout::SCATTER_BIN / parts);
+    halved.into_iter().find(fits).unwrap_or(layout::SCATTER_BIN / 8)
 }
 
 /// The tables that stay the same from frame to frame, in the device's layout.

@@ -157,7 +157,7 @@ pub fn rows(frame: &Frame) -> Vec<Row> {
                 sigma_wavefront: 5.0 - 0.06 * depth,
                 aperture: 0.1 - 0.0005 * depth,
                 strip_lines: 0.02 + 0.05 * depth,
-                // Narrow beams at every eighth sample.
+                // Narrow beams over 50 samples, as tables have them: not between two wide ones.
                 strip_core: if k % 200 / 50 == 2 { -1.0 } else { 0.8 - 0.01 * depth },
                 lobe: 10.0 + 0.2 * depth,
                 transmit_half: (0.21 * depth).min(7.13),
