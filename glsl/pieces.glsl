@@ -79,10 +79,7 @@ uvec3 march_piece(Stretch s, int number, vec2 x, float drowned) {
     // Squeezed tissue keeps its echo level though its scatterers are closer together.
     float growth = abs(dot(jacobian[0], cross(jacobian[1], jacobian[2])));
     float strength = lattice.amplitude * s.weight * frame.volume_scale * sqrt(clamp(growth, LEAST_GROWTH, 1.0 / LEAST_GROWTH));
-    float depth = tissues[s.tissue].texture_depth;
-    if (depth > 0.0) {
-        strength *= 1.0 + depth * tissue_texture(middle / tissues[s.tissue].texture_length, tissues[s.tissue].seed);
-    }
+    float depth = tissues[s.tissue].texture_depth, length_inverse = 1.0 / tissues[s.tissue].texture_length;
     ivec3 step_a = unit_step(walk.a), step_b = unit_step(walk.b), step_c = unit_step(walk.c);
     float planes = far / abs(walk.step);
     ivec2 plane = cells_between(vec2(-planes, planes), rest[walk.a], inverse_h);
@@ -116,7 +113,14 @@ uvec3 march_piece(Stretch s, int number, vec2 x, float drowned) {
                 signed_strength = mix(-strength, strength, (bits.z & 1u) == 0u);
                 found = counts && present(lattice, bits) && all(lessThanEqual(about, half_box));
             }
-            if (found) count.yz += hear(s, displaced(f, centre + rel) - s.o, signed_strength, number, x, drowned);
+            if (!found) continue;
+            vec3 from = displaced(f, centre + rel) - s.o;
+            if (depth > 0.0) {
+                // That of the axis beside the scatterer, as in march_planes.
+                vec3 on_axis = middle + (dot(from, s.d) - x.x - half_length) * d;
+                signed_strength *= 1.0 + depth * tissue_texture(on_axis * length_inverse, tissues[s.tissue].seed);
+            }
+            count.yz += hear(s, from, signed_strength, number, x, drowned);
         }
     }
     return count;

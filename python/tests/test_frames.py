@@ -187,9 +187,10 @@ def test_speckle_moves_with_a_live_mesh(labels):
     inside = slice(int(17 / pitch), int(24 / pitch))
     of = lambda frame: frame.envelope[20:28, inside].ravel()
     alike = lambda a, b: np.corrcoef(of(a), of(b))[0, 1]
-    # Single precision, and the kernel for deforming tissue, whose cells are summed otherwise: 0.995 and 0.992 were seen.
-    assert alike(moved, placed) > 0.99
-    assert alike(back, rest) > 0.99
+    # Single precision, and the kernel for deforming tissue, whose cells are summed otherwise. With the tissue's texture taken once
+    # every five millimetres the first was 0.987.
+    assert alike(moved, placed) > 0.998
+    assert alike(back, rest) > 0.998
     assert alike(moved, rest) < 0.5
 
 

@@ -81,9 +81,9 @@ impl<'a> Field<'a> {
         found
     }
 
-    /// The relative volume of the tissue around the reference point `p`: present volume over volume at rest.
-    pub fn growth(&self, p: DVec3) -> f64 {
-        (DMat3::IDENTITY + self.with_gradient(p).1).determinant().abs()
+    /// How the present place depends on the reference point, at `p`; its determinant is present volume over volume at rest.
+    pub fn jacobian(&self, p: DVec3) -> DMat3 {
+        DMat3::IDENTITY + self.with_gradient(p).1
     }
 
     /// Distance of nodes along x, mm.

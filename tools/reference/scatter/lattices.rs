@@ -193,9 +193,9 @@ impl Tube<'_> {
                 let reference = deformed.field.reference(middle);
                 // Squeezed tissue keeps its echo level though its scatterers are closer together.
                 let least = f64::from(LEAST_GROWTH);
-                let growth = deformed.field.growth(reference);
-                let texture =
-                    factor(self.tissue, reference) * growth.clamp(least, least.recip()).sqrt();
+                let jacobian = deformed.field.jacobian(reference);
+                let growth = jacobian.determinant().abs().clamp(least, least.recip());
+                let ahead = jacobian.inverse() * self.direction;
                 let (low, high) = self.bounds([x0, x1], half);
                 let low = ((low + back - spread) / h).floor().as_i64vec3();
                 let high = ((high + back + spread) / h).floor().as_i64vec3();
@@ -220,7 +220,9 @@ impl Tube<'_> {
                                 continue;
                             }
                             let power = self.power(number, x, bin, loudest, out);
-                            let strength = self.weight(x, row) * power.sqrt() * texture;
+                            let on_axis = reference + (x - x0.midpoint(x1)) * ahead;
+                            let texture = factor(self.tissue, on_axis);
+                            let strength = self.weight(x, row) * (power * growth).sqrt() * texture;
                             let ratio = self.ratio(x);
                             let heard = self.heard(from, x, row, ratio, in_row(row));
                             if heard > 0.0 {
