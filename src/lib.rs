@@ -3,34 +3,12 @@
 //! `scene` and `probe` describe the anatomy and the instrument; `gpu` knows Vulkan and no ultrasound;
 //! `sim` is the frame, `view` the window. Units: mm, microseconds, MHz.
 
-// For the library's public items: tools and tests have none.
-#![warn(missing_docs)]
-
-pub mod acquire;
-pub mod dataset;
-pub mod exam;
-pub mod exchange;
-pub mod gpu;
-pub mod igtl;
-pub mod import;
-pub mod issue;
-pub mod live;
-pub mod matching;
-pub mod output;
-pub mod probe;
-pub mod random;
-pub mod register;
-pub mod scene;
-pub mod settings;
-pub mod sim;
-pub mod statistics;
-pub mod study;
-pub mod teach;
+pub use insonify_base::{issue, random, statistics};
+pub use insonify_gpu as gpu;
+pub use insonify_lab::{
+    acquire, dataset, exam, exchange, igtl, import, matching, output, register, study, teach,
+};
+pub use insonify_scene::{live, probe, scene, settings, volume};
+pub use insonify_sim as sim;
 #[cfg(feature = "window")]
-pub mod view;
-pub mod volume;
-
-// Tests here skip as those in tests/ do.
-#[cfg(test)]
-#[path = "../tests/common/skip.rs"]
-mod skip;
+pub use insonify_window as view;

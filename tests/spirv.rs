@@ -5,7 +5,10 @@ use std::path::{Path, PathBuf};
 
 use insonify::sim::shaders::Library;
 
+#[cfg(feature = "compile")]
+use insonify::sim::shaders::authors;
 // A user's build does not contain it, nor does the library that is tested without `compile`.
+#[cfg(not(feature = "compile"))]
 #[allow(dead_code)]
 #[path = "../src/sim/shaders/authors/mod.rs"]
 mod authors;

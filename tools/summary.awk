@@ -15,7 +15,7 @@ function alone(names, n, i, name, which) {
   which = program
   sub(/\.rs$/, "", which)
   if (sub(/^tests\//, "--test ", which)) ;
-  else if (which ~ /lib$/) which = "--lib"
+  else if (which ~ / library$/) which = "--lib"
   else if (which ~ /^Doc-tests/) which = "--doc"
   else which = "--bin " (which == "src/main" ? "insonify" : which)
   n = split(names, name, " ")
@@ -27,6 +27,8 @@ function report(state, name, text) { lines[++count] = sprintf("%-7s %-34s %s", s
   close_program()
   program = $0
   sub(/^ +(Running (unittests )?)?/, "", program)
+  # Of a library its name, as each package has a lib.rs.
+  if (program ~ /lib\.rs \(/) { sub(/^.*\//, "", program); sub(/-[0-9a-f]+\)$/, " library", program) }
   sub(/ \([^(]*\)$/, "", program)
   result = names = last = ended = running = ""
   next

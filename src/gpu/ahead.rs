@@ -279,7 +279,7 @@ fn dispatch_nothing(device: &Arc<Device>, kernel: &Kernel) -> Result<(), GpuErro
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gpu::lone_test_device;
+    use crate::lone_test_device;
 
     #[test]
     fn a_kernel_is_dispatched_with_nothing_to_do() {

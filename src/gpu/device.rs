@@ -272,6 +272,11 @@ impl Device {
         self.accel.is_some()
     }
 
+    /// Returns whether the window has to wait for submissions of the simulation: both have one queue.
+    pub fn shares_queue(&self) -> bool {
+        self.queues.are_shared()
+    }
+
     /// Returns whether the validation layers are on.
     pub fn is_validating(&self) -> bool {
         self.instance.validating

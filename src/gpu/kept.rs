@@ -90,7 +90,7 @@ impl PipelineStore {
             Some(Ok(Some(content))) => (known, data) = content,
             Some(Err(problem)) => {
                 let file = file.as_ref().map(|f| f.display().to_string());
-                crate::output::note(format!(
+                insonify_base::output::note(format!(
                     "{}: {problem}; its kernels are compiled again",
                     file.unwrap_or_default()
                 ));
@@ -145,7 +145,9 @@ impl PipelineStore {
         thread::spawn(move || {
             let late = wait.recv_timeout(PATIENCE) == Err(RecvTimeoutError::Timeout);
             if late && !told.swap(true, Ordering::Relaxed) {
-                crate::output::note(format!("compiling kernels for {device}, the first time only"));
+                insonify_base::output::note(format!(
+                    "compiling kernels for {device}, the first time only"
+                ));
             }
         });
         Some(WaitNotice { _done: done })
@@ -167,7 +169,7 @@ impl PipelineStore {
             data.clear();
         }
         if let Err(error) = write(file, &encode(&known, &data)) {
-            crate::output::note(format!(
+            insonify_base::output::note(format!(
                 "compiled kernels are not kept: {}: {error}",
                 file.display()
             ));

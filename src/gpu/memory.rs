@@ -311,7 +311,7 @@ impl Device {
 #[cfg(test)]
 mod tests {
     use super::BufferKind;
-    use crate::gpu::{Image, ImageDim, ImageFormat, lone_test_device};
+    use crate::{Image, ImageDim, ImageFormat, lone_test_device};
 
     #[test]
     fn fresh_memory_is_poisoned_while_validating() {

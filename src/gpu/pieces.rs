@@ -184,7 +184,7 @@ fn cut(groups: [u32; 3], count: usize, whole: bool) -> Vec<Groups> {
 #[cfg(test)]
 mod tests {
     use super::{Groups, Pieces, cut};
-    use crate::gpu::FrameTimings;
+    use crate::FrameTimings;
 
     fn whole(groups: [u32; 3]) -> Groups {
         [[0; 3], groups]

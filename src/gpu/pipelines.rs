@@ -334,7 +334,7 @@ fn id(spirv: &[u32], specialization: &[(u32, u32)]) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gpu::{Kernel, lone_test_device};
+    use crate::{Kernel, lone_test_device};
 
     fn add(device: &Arc<Device>, factor: u32) -> Kernel {
         let spirv: Vec<u32> =

@@ -206,7 +206,7 @@ impl Rounds {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sim::layout::{FLAG_ROUGH_TRANSMISSION, SAMPLING_PLAIN};
+    use crate::layout::{FLAG_ROUGH_TRANSMISSION, SAMPLING_PLAIN};
 
     fn frame(paths: u32, max_interactions: u32) -> Frame {
         Frame {

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use proc_macro2::{Delimiter, TokenStream, TokenTree};
 use quote::ToTokens;
-use syn::{Attribute, Item};
+use syn::{Attribute, Item, UseTree};
 
 /// Modules that a part of the crate names, each with a file that does; the first two names of a path,
 /// or one where the second is no module.
@@ -29,6 +29,22 @@ pub fn of_library(root: &Path) -> BTreeMap<String, Uses> {
         }
     }
     out
+}
+
+/// The modules that the crate at this root passes on from the crates below it. What these use is the compiler's to say.
+pub fn passed_on(root: &Path) -> Vec<String> {
+    let ours = |name: &syn::Ident| name.to_string().starts_with("insonify_");
+    let mut uses = Uses::default();
+    for item in parsed(root).items {
+        let Item::Use(item) = item else { continue };
+        let names = match item.tree {
+            UseTree::Path(from) if ours(&from.ident) => from.tree.to_token_stream(),
+            UseTree::Rename(whole) if ours(&whole.ident) => whole.rename.to_token_stream(),
+            _ => continue,
+        };
+        uses.scan(quote::quote!(crate::#names), &[], root);
+    }
+    uses.paths.into_keys().collect()
 }
 
 /// The uses of the module in a file: of this library, and of another crate if the file belongs to one.

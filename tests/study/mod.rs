@@ -228,7 +228,7 @@ fn larger_images_are_reduced() {
 /// Words in the form's folder that it must not have: names of the plan, of parameters and of backgrounds.
 fn told(folder: &Path) -> Vec<String> {
     let template = ["page.html", "style.css", "script.js"].map(|name| {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/study/form").join(name);
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/lab/study/form").join(name);
         std::fs::read_to_string(path).expect("the template")
     });
     let template = template.concat().to_lowercase();

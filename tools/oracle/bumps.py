@@ -28,7 +28,7 @@ from scipy.fft import irfft2, rfft2
 SPEED = 1.540  # of the machine
 FREQUENCY, BANDWIDTH = 3.0, 0.6
 F_NUMBER, FOCUS = 2.5, 34.0
-APODISED = 0.6  # sigma of a focus over wavelength and f-number: src/probe/beam.rs
+APODISED = 0.6  # sigma of a focus over wavelength and f-number: src/scene/probe/beam.rs
 LAYERS = [(1.490, 1.0), (1.580, 1.0)]  # speed, density: fat and below
 TOP = 12.0
 WIRES = [(-5.0, 26.0), (0.0, 34.0), (5.0, 40.0)]

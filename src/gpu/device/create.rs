@@ -3,10 +3,10 @@
 use ash::{khr, vk};
 
 use super::AccelSupport;
-use crate::gpu::adapter::Adapter;
-use crate::gpu::error::{GpuError, during};
-use crate::gpu::instance::{Instance, loader_changes, loader_reads};
-use crate::gpu::queues::{QueueIndex, QueuePlan};
+use crate::adapter::Adapter;
+use crate::error::{GpuError, during};
+use crate::instance::{Instance, loader_changes, loader_reads};
+use crate::queues::{QueueIndex, QueuePlan};
 
 /// Opens the logical device with the queues of `plan`, and whatever this program can use of what the adapter offers.
 pub(super) fn device(

@@ -9,7 +9,7 @@ use std::sync::{Arc, LazyLock};
 use parking_lot::{RwLock, RwLockReadGuard, RwLockWriteGuard};
 
 use super::{Device, DeviceOptions};
-use crate::gpu::error::GpuError;
+use crate::error::GpuError;
 
 /// Shared by tests that use the device of all; held alone by a test with devices of its own.
 static TURNS: RwLock<()> = RwLock::new(());

@@ -1,8 +1,8 @@
 use ash::vk;
 
 use super::{QueueUser, SubmissionSlot};
-use crate::gpu::{Commands, GpuError, lone_test_device, test_device};
 use crate::skip::{Lacking, skip};
+use crate::{Commands, GpuError, lone_test_device, test_device};
 
 #[test]
 fn stages_in_many_batches_are_timed_and_so_is_what_follows() {

@@ -7,7 +7,7 @@ use std::path::Path;
 use ash::vk;
 
 use super::{MAX_FILES, decode, encode, file_name, is_of, read, write};
-use crate::gpu::{Binding, BufferKind, DeviceOptions, Frames, Kernel, LoneDevice, lone_device};
+use crate::{Binding, BufferKind, DeviceOptions, Frames, Kernel, LoneDevice, lone_device};
 
 fn properties() -> vk::PhysicalDeviceProperties {
     vk::PhysicalDeviceProperties {

@@ -5,8 +5,8 @@ use glam::Vec3A;
 use obvhs::aabb::Aabb;
 
 use super::MeshBvh;
+use crate::layout::RefitLevel;
 use crate::scene::Mesh;
-use crate::sim::layout::RefitLevel;
 
 /// The nodes of hierarchies level by level, deepest first, in the order that `refit` needs.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -105,8 +105,8 @@ impl MeshBvh {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bvh::{Node, SceneBvh};
     use crate::scene::shapes;
-    use crate::sim::bvh::{Node, SceneBvh};
     use insonify_tools::reference::refit::{Child, Geometry, child, refit};
 
     /// A mesh deformed like a beating heart: every vertex moves by up to 4 mm, neighbours alike.

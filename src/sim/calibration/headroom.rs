@@ -3,10 +3,10 @@
 use std::f64::consts::TAU;
 
 use super::{Calibration, amplitude};
+use crate::layout::{ECHO_LIMIT, LEVELS_PER_OCTAVE, STRIP_LIMIT};
 use crate::scene::Tissue;
 use crate::settings::ScatterMode;
-use crate::sim::layout::{ECHO_LIMIT, LEVELS_PER_OCTAVE, STRIP_LIMIT};
-use crate::sim::tables::wire_spacing;
+use crate::tables::wire_spacing;
 
 /// Largest fixed-point scale of surfaces: one unit is -120 dB re a perfect mirror.
 const LARGEST_SCALE: f64 = (1u32 << 20) as f64;

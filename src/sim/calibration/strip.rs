@@ -9,9 +9,9 @@ use std::f64::consts::PI;
 use std::sync::LazyLock;
 
 use super::{Calibration, autocorrelation, lateral_taps};
+use crate::layout::{LATERAL_REACH, LEAST_PITCH, STRIP_CUT};
 use crate::settings::ScatterMode;
-use crate::sim::layout::{LATERAL_REACH, LEAST_PITCH, STRIP_CUT};
-use crate::sim::special::erf;
+use crate::special::erf;
 
 /// Loss of likeness between two images half a pitch apart, beyond that of a Gaussian beam, up to which neighbouring lines need
 /// not share scatterers: a strip with abrupt edges loses 1 / (16 s^2), s the beam's deviation in pitches, and one that shares

@@ -8,8 +8,8 @@ use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::ray::Ray;
 
+use crate::bvh;
 use crate::scene::{Mesh, Scene, triangle};
-use crate::sim::bvh;
 
 /// Crossings of one mesh from one side closer together than this, mm, are one crossing: a line through
 /// an edge meets both its triangles.

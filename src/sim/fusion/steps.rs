@@ -23,7 +23,7 @@ pub struct FusionSteps {
 impl Simulator {
     /// The bindings of the fusion's kernels that are not buffers of the frame, as name and floats; empty unless the
     /// last frame, of `scene`, showed an acquired volume.
-    pub(in crate::sim) fn fusion_dump(
+    pub(crate) fn fusion_dump(
         &mut self,
         scene: &Scene,
     ) -> Result<Vec<(&'static str, Vec<u8>)>, SimError> {
@@ -42,7 +42,7 @@ impl Simulator {
 
     /// Makes the intermediate images of the last frame everywhere, if it showed an acquired volume: frames themselves make
     /// them only around the border.
-    pub(in crate::sim) fn complete_steps(&mut self) -> Result<(), SimError> {
+    pub(crate) fn complete_steps(&mut self) -> Result<(), SimError> {
         if self.fused {
             self.submissions.wait()?;
             self.device.once(|cmd| self.passes.fusion_steps(cmd))?;

@@ -10,17 +10,17 @@ use crate::scene::fusion::TEXTURE_BUDGET as BUDGET;
 use crate::volume::Voxels;
 
 /// The textures and the meaning of their texels, which is the same at all times.
-pub(in crate::sim) struct VolumeTexture {
+pub(crate) struct VolumeTexture {
     /// One texture per time, all on the device, so that changing the time costs nothing.
-    pub(in crate::sim) images: Vec<Image>,
+    pub(crate) images: Vec<Image>,
     /// Texel indices from voxel indices.
-    pub(in crate::sim) texel_from_voxel: DAffine3,
+    pub(crate) texel_from_voxel: DAffine3,
     /// Stored values are `scale * texel + offset`.
-    pub(in crate::sim) scale: f64,
+    pub(crate) scale: f64,
     /// See `scale`.
-    pub(in crate::sim) offset: f64,
+    pub(crate) offset: f64,
     /// A warning for the user, if detail was lost on the way.
-    pub(in crate::sim) warning: Option<String>,
+    pub(crate) warning: Option<String>,
 }
 
 /// Texels of one format.
@@ -37,7 +37,7 @@ impl VolumeTexture {
     ///
     /// # Errors
     /// A device error.
-    pub(in crate::sim) fn new(device: &Arc<Device>, acquired: &Acquired) -> Result<Self, GpuError> {
+    pub(crate) fn new(device: &Arc<Device>, acquired: &Acquired) -> Result<Self, GpuError> {
         let limit = device.limits().max_image_3d as usize;
         let block = block(acquired, limit, BUDGET);
         let size = std::array::from_fn(|i| acquired.size[i].div_ceil(block[i]));
@@ -78,17 +78,17 @@ impl VolumeTexture {
 
 impl VolumeTexture {
     /// Texels along each axis.
-    pub(in crate::sim) fn extent(&self) -> [u32; 3] {
+    pub(crate) fn extent(&self) -> [u32; 3] {
         self.images[0].extent()
     }
 
     /// Bytes of all textures.
-    pub(in crate::sim) fn bytes(&self) -> u64 {
+    pub(crate) fn bytes(&self) -> u64 {
         self.images.iter().map(Image::bytes).sum()
     }
 
     /// The texels of one time as a kernel fetches them, floats.
-    pub(in crate::sim) fn read(&self, time: usize) -> Result<Vec<u8>, GpuError> {
+    pub(crate) fn read(&self, time: usize) -> Result<Vec<u8>, GpuError> {
         let image = &self.images[time];
         let bytes = image.read_back()?;
         let floats: Vec<f32> = match image.format() {

@@ -29,7 +29,7 @@ pub fn extent([width, height]: [u32; 2], turned: bool) -> Extent {
 
 impl Passes {
     /// Sums the mask over the box.
-    pub(in crate::sim) fn blur(&self, cmd: &mut Commands<'_>) -> Result<(), GpuError> {
+    pub(crate) fn blur(&self, cmd: &mut Commands<'_>) -> Result<(), GpuError> {
         let size = [self.frame().image_width, self.frame().image_height];
         for (turned, name) in [(false, "sums"), (true, "mask")] {
             cmd.scope(BLUR.name);

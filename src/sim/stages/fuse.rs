@@ -33,11 +33,7 @@ pub const FUSE: Pass = Pass {
 
 impl Passes {
     /// Records the images mixed with the acquired volume.
-    pub(in crate::sim) fn fuse(
-        &self,
-        cmd: &mut Commands<'_>,
-        fusion: &Fusion,
-    ) -> Result<(), GpuError> {
+    pub(crate) fn fuse(&self, cmd: &mut Commands<'_>, fusion: &Fusion) -> Result<(), GpuError> {
         self.run(cmd, &MASK)?;
         if fusion.background_shadows {
             self.run(cmd, &SHADOW)?;
@@ -84,7 +80,7 @@ impl Passes {
     }
 
     /// Records the intermediate images of the last fused frame, which that has made only where it needed them.
-    pub(in crate::sim) fn fusion_steps(&self, cmd: &mut Commands<'_>) -> Result<(), GpuError> {
+    pub(crate) fn fusion_steps(&self, cmd: &mut Commands<'_>) -> Result<(), GpuError> {
         self.convert(cmd, true)?;
         self.blur(cmd)
     }

@@ -26,7 +26,7 @@ pub const PAINT: Pass = Pass {
 impl Passes {
     /// Colours the finished images into buffers of their own, ready to be copied; after `chart`. Returns that of the
     /// first one.
-    pub(in crate::sim) fn paint(
+    pub(crate) fn paint(
         &mut self,
         cmd: &mut Commands<'_>,
         scene: &Scene,

@@ -31,7 +31,7 @@ pub const COLLAPSE: Pass = Pass {
 };
 
 /// True if frames of a scene are blended by bands.
-pub(in crate::sim) fn is_banded(scene: &Scene) -> bool {
+pub(crate) fn is_banded(scene: &Scene) -> bool {
     scene.shows_volume() && scene.fusion.as_ref().is_some_and(|f| f.blend == Blend::Multiband)
 }
 
@@ -45,12 +45,12 @@ struct PyramidLevel {
 
 /// The levels, finest first; empty until they are needed.
 #[derive(Default)]
-pub(in crate::sim) struct Pyramid(Vec<PyramidLevel>);
+pub(crate) struct Pyramid(Vec<PyramidLevel>);
 
 impl Pyramid {
     /// Makes room for `levels` levels above the finest, of images of up to `pixels` pixels, whatever
     /// their shape.
-    pub(in crate::sim) fn fit(
+    pub(crate) fn fit(
         &mut self,
         device: &Arc<Device>,
         pixels: u64,
@@ -69,14 +69,14 @@ impl Pyramid {
     }
 
     /// The values added to the pixels of the acquired image.
-    pub(in crate::sim) fn change(&self) -> &Buffer {
+    pub(crate) fn change(&self) -> &Buffer {
         &self.0[0].change
     }
 }
 
 impl Passes {
     /// Computes [`Pyramid::change`].
-    pub(in crate::sim) fn bands(&self, cmd: &mut Commands<'_>) -> Result<(), GpuError> {
+    pub(crate) fn bands(&self, cmd: &mut Commands<'_>) -> Result<(), GpuError> {
         let fusion = self.lanes[0].fusion.as_ref();
         let top = fusion.and_then(|fusion| fusion.bands).expect("blended by bands") as usize;
         let size = [self.frame().image_width, self.frame().image_height];

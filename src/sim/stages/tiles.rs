@@ -40,11 +40,7 @@ impl Sizes {
 
 impl Passes {
     /// Sorts the tiles; if `whole`, every intermediate image is then made everywhere.
-    pub(in crate::sim) fn tiles(
-        &self,
-        cmd: &mut Commands<'_>,
-        whole: bool,
-    ) -> Result<(), GpuError> {
+    pub(crate) fn tiles(&self, cmd: &mut Commands<'_>, whole: bool) -> Result<(), GpuError> {
         cmd.scope(TILES.name);
         let extent = TILES.extent.expect("stated above")(self.frame());
         let push = u32::from(whole);

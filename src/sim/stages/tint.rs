@@ -30,7 +30,7 @@ pub struct Tint {
 impl Passes {
     /// Colours the mixed images into buffers of their own, ready to be copied; after [`Self::fuse`]. Returns that of the
     /// first one.
-    pub(in crate::sim) fn tint(
+    pub(crate) fn tint(
         &mut self,
         cmd: &mut Commands<'_>,
         tint: &Tint,

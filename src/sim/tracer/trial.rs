@@ -8,14 +8,14 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::Tracer;
+use crate::SimError;
+use crate::bvh::Splits;
+use crate::fields::Fields;
 use crate::gpu::{Binding, BufferKind, Device, GpuError, Kernel};
+use crate::layout::{NONE, Ray, RayHit};
 use crate::scene::Scene;
-use crate::sim::SimError;
-use crate::sim::bvh::Splits;
-use crate::sim::fields::Fields;
-use crate::sim::layout::{NONE, Ray, RayHit};
-use crate::sim::shaders::Library;
-use crate::sim::world::{ShapeKernels, World};
+use crate::shaders::Library;
+use crate::world::{ShapeKernels, World};
 
 /// Rays followed at the same time: one per line, if there are as many lines.
 const RAYS: u32 = 1344;

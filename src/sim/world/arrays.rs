@@ -4,14 +4,14 @@ use rayon::prelude::*;
 
 use super::entry;
 use super::joined::{SharingSet, SharingSets};
+use crate::bvh::{BvhError, BvhInstance, MeshBvh, SceneBvh, Splits};
+use crate::fields::Fields;
+use crate::layout::{self, NONE};
+use crate::placement::stretch;
 use crate::scene::smoothed::{self, FINEST, smoothed};
 use crate::scene::{Instance, Mesh, Scene, Strategy};
 use crate::settings::Refraction;
-use crate::sim::bvh::{BvhError, BvhInstance, MeshBvh, SceneBvh, Splits};
-use crate::sim::fields::Fields;
-use crate::sim::layout::{self, NONE};
-use crate::sim::placement::stretch;
-use crate::sim::tracer::Tracer;
+use crate::tracer::Tracer;
 
 /// A box in object space, mm: smallest and largest corner.
 pub(super) type Bounds = [[f32; 3]; 2];
@@ -409,7 +409,7 @@ mod tests {
     /// Triangles are not cut on a device whose largest buffer has no room for them.
     #[test]
     fn triangles_are_cut_where_they_fit() {
-        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/limbs.toml");
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/limbs.toml");
         let (scene, _) = Scene::load(&file, &[]).unwrap();
         let within = |most, splits| {
             let fields = Fields::none(&scene);

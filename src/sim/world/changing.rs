@@ -7,11 +7,11 @@ use super::arrays::{Averages, Bounds, GeometryRange, ordered};
 use super::refit::Refit;
 use super::top::TopLevel;
 use super::{GeometryBuffers, ShapeKernels, WorldError};
+use crate::bvh::MeshBvh;
+use crate::fields::Fields;
 use crate::gpu::{Blas, Commands, Device, DynamicBlas, DynamicSource, GpuError, Stage};
 use crate::scene::{Instance, Scene, Strategy};
-use crate::sim::bvh::MeshBvh;
-use crate::sim::fields::Fields;
-use crate::sim::tracer::Tracer;
+use crate::tracer::Tracer;
 
 /// The shape of an instance: a mesh of the scene and its revision, or keyframes with their weights.
 #[derive(Clone, Copy, Debug, PartialEq)]

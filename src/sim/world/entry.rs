@@ -4,10 +4,10 @@ use glam::DAffine3;
 
 use super::arrays::{Bounds, GeometryRange, is_dynamic};
 use super::joined::SharingSets;
+use crate::fields::Fields;
+use crate::layout::{self, NONE};
+use crate::placement::{matrix_rows, rigid, stretch};
 use crate::scene::{Instance, Scene, Strategy};
-use crate::sim::fields::Fields;
-use crate::sim::layout::{self, NONE};
-use crate::sim::placement::{matrix_rows, rigid, stretch};
 
 /// Mask bit of every entry that is not selected by its mask.
 const UNSELECTED_BIT: u8 = 1;

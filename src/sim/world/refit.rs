@@ -7,13 +7,13 @@ use super::arrays::{GeometryRange, ordered};
 use super::changing::{put_tree, put_triangles};
 use super::top::TopLevel;
 use super::{GeometryBuffers, ShapeKernels, WorldError};
+use crate::bvh::{MeshBvh, levels};
+use crate::fields::Fields;
 use crate::gpu::{Binding, Buffer, BufferKind, Commands, Device, GpuError, Stage};
+use crate::layout::{Interpolation, PACKED, RefitLevel, SUM, UNIT};
 use crate::scene::smoothed::LEVELS;
 use crate::scene::{Instance, Scene, Strategy};
-use crate::sim::bvh::{MeshBvh, levels};
-use crate::sim::fields::Fields;
-use crate::sim::layout::{Interpolation, PACKED, RefitLevel, SUM, UNIT};
-use crate::sim::tracer::Tracer;
+use crate::tracer::Tracer;
 
 /// Relative cost of rays from which on a tree is built again instead of refitted (choice; a build costs some
 /// ten refits).

@@ -6,13 +6,13 @@ use super::WorldError;
 use super::arrays::{Residency, needs, ordered, placed};
 use super::entry::{self, EntryGeometry, TopLevelEntry};
 use super::joined::{SharingSet, SharingSets};
+use crate::bvh::SceneBvh;
 use crate::gpu::{
     Binding, Blas, BlasInput, BlasOptions, Buffer, Commands, Device, GpuError, Stage, Tlas,
     TlasInstance,
 };
+use crate::placement::matrix_rows;
 use crate::scene::Scene;
-use crate::sim::bvh::SceneBvh;
-use crate::sim::placement::matrix_rows;
 
 /// The structures that the tracer walks.
 enum TracerStructure {

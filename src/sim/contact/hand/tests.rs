@@ -4,9 +4,9 @@ use std::path::Path;
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 
 use super::{Body, Hand, PRESS, Spot};
+use crate::contact::Skin;
 use crate::probe::{Kind, Probe};
 use crate::scene::Scene;
-use crate::sim::contact::Skin;
 
 fn skin(shape: &str) -> Skin {
     let folder = tempfile::tempdir().unwrap();
@@ -148,7 +148,7 @@ fn over_the_edges_of_a_box_the_probe_turns_smoothly() {
 /// A slide all around the shipped abdomen.
 #[test]
 fn on_the_abdomen_the_probe_slides_without_a_jump() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/abdomen.toml");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/abdomen.toml");
     let scene = Scene::load(&path, &[]).unwrap().0;
     let skin = Body::of(&scene).unwrap().at(0.0);
     let probe = &scene.probe;

@@ -1,19 +1,25 @@
 //! The trial on the device's ray query, and on results that are wrong.
 
+use std::path::Path;
 use std::sync::Arc;
 
 use bytemuck::Zeroable;
 
 use super::{RayHit, Trial, agree, id};
 use crate::gpu::test_device;
+use crate::layout::NONE;
 use crate::scene::Scene;
-use crate::sim::layout::NONE;
-use crate::sim::shaders::Library;
-use crate::sim::tracer::tried;
+use crate::shaders::Library;
 use crate::skip::{Lacking, skip};
+use crate::tracer::tried;
 
 fn hit(instance: u32, t: f32) -> RayHit {
     RayHit { instance, t, ..RayHit::zeroed() }
+}
+
+fn phantom() -> Scene {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/phantom.toml");
+    Scene::load(&file, &[]).unwrap().0
 }
 
 #[test]
@@ -23,7 +29,7 @@ fn the_ray_query_finds_the_surfaces_of_a_scene() {
         skip(Lacking::Tool, &format!("'{}' has no ray queries", device.name()));
         return;
     }
-    let (scene, _) = Scene::load("scenes/phantom.toml".as_ref(), &[]).unwrap();
+    let scene = phantom();
     let trial = Trial::run(&device, &library, &scene).unwrap();
     assert!(trial.rays > 3000, "{trial:?}");
     assert_eq!(device.validation_messages(), [""; 0]);
@@ -52,7 +58,7 @@ fn a_surface_that_is_missed_or_found_again_counts() {
 #[test]
 fn another_geometry_is_tried_again() {
     let library = Library::embedded();
-    let (mut scene, _) = Scene::load("scenes/phantom.toml".as_ref(), &[]).unwrap();
+    let mut scene = phantom();
     let before = id(&library, &scene);
     assert_eq!(id(&library, &scene), before);
     Arc::make_mut(&mut scene.meshes[0]).positions[0][1] += 1.0;

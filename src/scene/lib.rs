@@ -1,0 +1,11 @@
+//! What is imaged, and by which probe: settings, scene files, meshes, motion, acquired volumes. It knows no Vulkan.
+
+#![warn(missing_docs)]
+
+use insonify_base::{issue, output};
+
+pub mod live;
+pub mod probe;
+pub mod scene;
+pub mod settings;
+pub mod volume;

@@ -1,0 +1,205 @@
+//! The scenes that ship. They are packed into the program, and unpacked into the user's folder of data when one of them
+//! is asked for: so they are found wherever the program stands, and read as all scenes are.
+
+use std::io::{Error, Read as _, Result};
+use std::path::{Component, Path, PathBuf};
+
+use flate2::read::GzDecoder;
+
+use crate::output::files;
+
+static ARCHIVE: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/scenes.tar.gz"));
+
+/// A scene that ships.
+#[derive(Debug)]
+pub struct Shipped {
+    /// Its name: that of its file without `.toml`.
+    pub name: &'static str,
+    /// Its title.
+    pub title: &'static str,
+    /// A small picture of it, PNG.
+    pub picture: &'static [u8],
+}
+
+include!(concat!(env!("OUT_DIR"), "/scenes.rs"));
+
+/// Names of all scenes that ship, for messages.
+pub fn names() -> String {
+    let names: Vec<_> = SCENES.iter().map(|scene| scene.name).collect();
+    names.join(", ")
+}
+
+/// The scene file that `path` means: the file itself where there is one; for `heart`, `heart.toml` and
+/// `scenes/heart.toml` else the scene that ships, unpacked; and any other path as it is.
+///
+/// # Errors
+/// There is no place to unpack it to.
+pub fn find(path: &Path) -> Result<PathBuf> {
+    match (path.is_file(), named(path)) {
+        (false, Some(name)) => unpacked(name),
+        _ => Ok(path.to_owned()),
+    }
+}
+
+/// The file of the scene of this name, unpacked.
+///
+/// # Errors
+/// There is no place to unpack it to.
+pub fn unpacked(name: &str) -> Result<PathBuf> {
+    let folder = folder().ok_or_else(|| Error::other("there is no folder for a user's data"))?;
+    unpack(&folder).map_err(|e| {
+        Error::new(
+            e.kind(),
+            format!("unpacking the scenes that ship into {}: {e}", folder.display()),
+        )
+    })?;
+    Ok(folder.join(format!("{name}.toml")))
+}
+
+/// True for files that were unpacked: they are to stay as they ship.
+pub fn is_shipped(path: &Path) -> bool {
+    let own = folder().and_then(|folder| folder.canonicalize().ok());
+    let path = path.canonicalize();
+    own.is_some_and(|own| path.is_ok_and(|path| path.starts_with(own)))
+}
+
+/// The way from `folder` to a scene's file, for what is written there and handed on: the name of a scene that ships; the
+/// file's name alone where the way would lead through folders that name a person or a machine.
+pub fn cited(scene: &Path, folder: &Path) -> String {
+    let file = scene.file_name().unwrap_or(scene.as_os_str()).to_string_lossy().into_owned();
+    if is_shipped(scene) {
+        return file.trim_end_matches(".toml").to_owned();
+    }
+    // The parent of a bare name is empty, which means the folder of work.
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    let [scene, folder] = [scene, folder].map(std::path::absolute);
+    let way = scene.ok().zip(folder.ok());
+    way.and_then(|(scene, folder)| way_to(&scene, &folder, dirs::home_dir())).unwrap_or(file)
+}
+
+/// The way from a folder to a file, both absolute, with `/` between its parts; none where they have nothing but the root in
+/// common, or where it leads from elsewhere into a user's home folder.
+fn way_to(file: &Path, folder: &Path, home: Option<PathBuf>) -> Option<String> {
+    let [to, from]: [Vec<_>; 2] = [file, folder].map(|path| path.components().collect());
+    let common = to.iter().zip(&from).take_while(|(a, b)| a == b).count();
+    let shared: PathBuf = to[..common].iter().collect();
+    let enters = home.is_some_and(|home| file.starts_with(&home) && !shared.starts_with(&home));
+    if !to[..common].iter().any(|part| matches!(part, Component::Normal(_))) || enters {
+        return None;
+    }
+    let up = from[common..].iter().map(|_| "..".into());
+    let down = to[common..].iter().map(|part| part.as_os_str().to_string_lossy());
+    Some(up.chain(down).collect::<Vec<_>>().join("/"))
+}
+
+/// Not in a cache: scenes saved elsewhere go on naming the meshes in it. Each content has a folder of its own.
+fn folder() -> Option<PathBuf> {
+    dirs::data_local_dir().map(|data| data.join("insonify").join(format!("scenes-{STAMP:08x}")))
+}
+
+/// The scene that ships under this name.
+fn named(path: &Path) -> Option<&'static str> {
+    let bare =
+        path.parent().is_none_or(|folder| folder.as_os_str().is_empty() || folder == "scenes");
+    let stem = path.with_extension("");
+    let is_file = path.extension().is_none_or(|e| e == "toml");
+    let stem = stem.file_name().filter(|_| bare && is_file)?.to_str()?;
+    SCENES.iter().map(|scene| scene.name).find(|name| *name == stem)
+}
+
+/// Writes the files of the archive that are not in `folder` as they should be.
+fn unpack(folder: &Path) -> Result<()> {
+    let is_there = |&(name, size): &(&str, u64)| {
+        std::fs::metadata(folder.join(name)).is_ok_and(|file| file.len() == size)
+    };
+    if FILES.iter().all(is_there) {
+        return Ok(());
+    }
+    let mut archive = tar::Archive::new(GzDecoder::new(ARCHIVE));
+    for entry in archive.entries()? {
+        let mut entry = entry?;
+        let path = folder.join(entry.path()?);
+        if std::fs::metadata(&path).is_ok_and(|file| file.len() == entry.size()) {
+            continue;
+        }
+        std::fs::create_dir_all(path.parent().expect("it lies in the folder"))?;
+        let mut bytes = Vec::new();
+        entry.read_to_end(&mut bytes)?;
+        files::replace(&path, &bytes)?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Scene;
+
+    #[test]
+    fn scenes_are_meant_by_name_and_no_other_path_is() {
+        for path in ["heart", "heart.toml", "scenes/heart.toml", "scenes/heart"] {
+            assert_eq!(named(Path::new(path)), Some("heart"), "{path}");
+        }
+        for path in
+            ["hart", "heart.obj", "mine/heart.toml", "/heart.toml", "", "scenes", "../heart"]
+        {
+            assert_eq!(named(Path::new(path)), None, "{path}");
+        }
+        assert!(names().starts_with("abdomen, artery"), "{}", names());
+    }
+
+    #[test]
+    fn what_is_handed_on_does_not_say_whose_machine_it_was_made_on() {
+        let home = || Some(PathBuf::from("/home/anna"));
+        let way = |file: &str, folder: &str| way_to(Path::new(file), Path::new(folder), home());
+        for (file, folder, expected) in [
+            ("/home/anna/us/a.toml", "/home/anna/us", Some("a.toml")),
+            ("/home/anna/us/a.toml", "/home/anna/out/1", Some("../../us/a.toml")),
+            ("/data/scenes/a.toml", "/data/out", Some("../scenes/a.toml")),
+            ("/home/anna/us/a.toml", "/home/shared", None),
+            ("/home/anna/us/a.toml", "/tmp", None),
+            ("/data/scenes/a.toml", "/tmp", None),
+        ] {
+            assert_eq!(way(file, folder).as_deref(), expected, "{file} from {folder}");
+        }
+        let heart = unpacked("heart").expect("a folder of data");
+        assert_eq!(cited(&heart, Path::new("/tmp")), "heart");
+        let elsewhere = tempfile::tempdir().expect("a folder").path().join("liver.toml");
+        assert_eq!(cited(&elsewhere, Path::new("/nowhere/else")), "liver.toml");
+    }
+
+    #[test]
+    fn all_that_ships_comes_out_as_it_went_in_and_is_mended() {
+        let folder = tempfile::tempdir().expect("a folder");
+        unpack(folder.path()).expect("room");
+        let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
+        for (name, _) in FILES {
+            let [there, here] = [&source, folder.path()].map(|at| std::fs::read(at.join(name)));
+            assert!(there.expect("it ships") == here.expect("unpacked"), "{name}");
+        }
+        let (scene, _) = Scene::load(&folder.path().join("pregnancy.toml"), &[]).expect("sound");
+        assert_eq!(
+            scene.name,
+            SCENES.iter().find(|s| s.name == "pregnancy").expect("it ships").title
+        );
+        let broken = folder.path().join("heart.toml");
+        std::fs::write(&broken, "half").expect("written");
+        std::fs::remove_file(folder.path().join("fetus/sac.obj")).expect("it was there");
+        unpack(folder.path()).expect("room");
+        assert_eq!(
+            std::fs::read(&broken).expect("there"),
+            std::fs::read(source.join("heart.toml")).expect("there")
+        );
+        assert!(folder.path().join("fetus/sac.obj").exists());
+    }
+
+    #[test]
+    fn pictures_of_all_scenes_can_be_read() {
+        for scene in SCENES {
+            let picture = image::load_from_memory(scene.picture).expect(scene.name);
+            assert!(picture.height() >= 150 && picture.width() >= 150, "{}", scene.name);
+            assert!(!scene.title.is_empty());
+        }
+        assert!(SCENES.len() >= 9);
+    }
+}

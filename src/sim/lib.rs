@@ -1,0 +1,453 @@
+//! The frame: scene and probe to B-mode image on the device. This crate and those below it (`base`, `gpu`, `scene`) are the engine.
+//!
+//! ```no_run
+//! use insonify_gpu::{Device, DeviceOptions};
+//! use insonify_scene::scene::Scene;
+//! use insonify_sim::{Simulator, Tracer, shaders::Library};
+//!
+//! let (scene, _warnings) = Scene::load("scenes/abdomen.toml", &[])?;
+//! let device = Device::new(&DeviceOptions::default())?;
+//! let mut simulator = Simulator::new(&device, &Library::embedded(), &scene, Tracer::Bvh)?;
+//! simulator.frame(&scene, 0)?;
+//! let (width, height, rgba) = simulator.pixels()?;
+//! image::save_buffer("abdomen.png", &rgba, width, height, image::ExtendedColorType::Rgba8)?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+#![warn(missing_docs)]
+
+use insonify_base::output;
+use insonify_gpu as gpu;
+use insonify_scene::{probe, scene, settings, volume};
+
+mod batches;
+mod buffers;
+pub mod bvh;
+pub mod calibration;
+pub mod contact;
+pub mod dump;
+mod expected;
+pub mod facts;
+pub mod fields;
+pub mod fusion;
+pub mod labels;
+mod lane;
+pub mod layout;
+mod line;
+pub mod lobe;
+pub mod memory;
+pub mod pass;
+mod passes;
+pub mod placement;
+mod read_out;
+mod resize;
+mod results;
+mod rf;
+pub mod rounds;
+pub mod seen;
+pub mod shaders;
+pub mod special;
+pub mod stages;
+pub mod tables;
+pub mod tracer;
+pub mod view3d;
+pub mod world;
+
+// Tests here skip as those in tests/ do.
+#[cfg(test)]
+#[path = "../../tests/common/skip.rs"]
+mod skip;
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use crate::gpu::{Abandon, AdapterKind, Device, FrameTimings, Frames, GpuError, Image};
+use crate::scene::{Scene, Surface, Tissue, Wire};
+use crate::settings::{Machine, Settings};
+use batches::FrameBudget;
+use bvh::Splits;
+use contact::SkinContact;
+use fusion::{FusionResources, Tint};
+use lane::Lane;
+pub use lane::Shot;
+use line::OneLine;
+pub use memory::Memory;
+use passes::{PassKernels, Passes, frame_constants};
+pub use resize::image_size;
+use shaders::Library;
+use stages::{AXIAL, BEAM, CHART, DISPLAY, LABEL, LEVEL, SCATTER};
+use tables::Tables;
+pub use tracer::Tracer;
+use view3d::Viewer3d;
+use world::World;
+
+/// Why a scene cannot be simulated.
+#[derive(Debug, thiserror::Error)]
+pub enum SimError {
+    /// The Vulkan layer failed.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+    /// The geometry does not fit the tracer.
+    #[error(transparent)]
+    World(#[from] world::WorldError),
+}
+
+/// The kind of machine that a device is: a software driver on the processor, or a GPU.
+pub fn machine(device: &Device) -> Machine {
+    match device.info().kind {
+        AdapterKind::Cpu => Machine::Software,
+        _ => Machine::Gpu,
+    }
+}
+
+/// A scene on the device, ready to be imaged frame by frame.
+pub struct Simulator {
+    device: Arc<Device>,
+    submissions: Frames,
+    passes: Passes,
+    coincident: bool,
+    sources: Sources,
+    tables: Tables,
+    table_cache: TableCache,
+    counting: bool,
+    /// True if the last frame was mixed with an acquired volume.
+    fused: bool,
+    /// True if the labels of the last frame have levels.
+    levelled: bool,
+    /// True if the last frame has labels.
+    labelled: bool,
+    /// The image into which the next frames are copied.
+    shown_on: Option<Image>,
+    /// The kernel and buffers of the 3D view; made when it is first asked for.
+    viewer3d: Option<Viewer3d>,
+    tinted_on: Option<(Image, Tint)>,
+    painted_on: Option<(Image, f32)>,
+    /// The image of the last frame whose results are read.
+    chosen: usize,
+    update_time: Duration,
+}
+
+/// Tables of settings used before, kept because settings come back: live quality changes between levels.
+#[derive(Default)]
+struct TableCache(Vec<(Sources, Tables)>);
+
+impl TableCache {
+    /// Most tables kept: more than there are levels of quality.
+    const MOST: usize = 12;
+
+    fn take(&mut self, sources: &Sources) -> Option<Tables> {
+        let at = self.0.iter().position(|(made_of, _)| made_of == sources)?;
+        Some(self.0.remove(at).1)
+    }
+
+    fn put(&mut self, sources: Sources, tables: Tables) {
+        if self.0.len() == Self::MOST {
+            self.0.remove(0);
+        }
+        self.0.push((sources, tables));
+    }
+}
+
+/// The settings from which the tables on the device were made.
+#[derive(PartialEq)]
+struct Sources {
+    settings: Settings,
+    tissues: Vec<Tissue>,
+    surfaces: Vec<[Surface; 2]>,
+    wires: Vec<Wire>,
+}
+
+impl Sources {
+    fn of(scene: &Scene) -> Self {
+        let mut settings = scene.settings.clone();
+        // Seeds are no part of the tables.
+        settings.simulation.seed = 0;
+        Self {
+            settings,
+            tissues: scene.tissues.clone(),
+            surfaces: scene.instances.iter().map(|i| i.surface).collect(),
+            wires: scene.wires.clone(),
+        }
+    }
+}
+
+impl Simulator {
+    /// Uploads `scene` and builds its acceleration structures for `tracer`.
+    ///
+    /// # Errors
+    /// Device out of memory, a binding over the device's limit, geometry too deep for the tracer.
+    pub fn new(
+        device: &Arc<Device>,
+        library: &Library,
+        scene: &Scene,
+        tracer: Tracer,
+    ) -> Result<Self, SimError> {
+        Self::with_splits(device, library, scene, tracer, Splits::default())
+    }
+
+    /// Like [`Self::new`], with trees of the compute tracer built as `splits` says.
+    ///
+    /// # Errors
+    /// Those of [`Self::new`].
+    pub fn with_splits(
+        device: &Arc<Device>,
+        library: &Library,
+        scene: &Scene,
+        tracer: Tracer,
+        splits: Splits,
+    ) -> Result<Self, SimError> {
+        let shapers = Arc::new(world::ShapeKernels::new(device, library)?);
+        let world = World::with_splits(device, &shapers, scene, tracer, splits)?;
+        let coincident = scene.coincident_triangles() > 0;
+        let budget = FrameBudget::of(device);
+        let tables = Tables::new(scene);
+        let constants = tables.frame(scene);
+        let (frame, batches) = frame_constants(constants, &world, coincident, &budget, None);
+        let lane = Lane::new(device, scene, batches.sizes(&frame, &tables), None)?;
+        let simulator = Self {
+            device: Arc::clone(device),
+            submissions: Frames::new(device, "frame")?,
+            coincident,
+            sources: Sources::of(scene),
+            tables,
+            table_cache: TableCache::default(),
+            counting: false,
+            fused: false,
+            labelled: false,
+            levelled: false,
+            shown_on: None,
+            viewer3d: None,
+            tinted_on: None,
+            painted_on: None,
+            chosen: 0,
+            update_time: Duration::ZERO,
+            passes: Passes {
+                kernels: PassKernels::new(device, library, scene, &world, false)?,
+                lanes: vec![lane],
+                active: 1,
+                skins: contact::Skins::default(),
+                world,
+                shown: frame,
+                last: None,
+                remembers: false,
+                batches,
+            },
+        };
+        simulator.upload_tables()?;
+        Ok(simulator)
+    }
+
+    fn upload_tables(&self) -> Result<(), GpuError> {
+        let buffers = &self.passes.lanes[0].buffers;
+        let arrays = self.tables.arrays().into_iter().filter(|(_, bytes)| !bytes.is_empty());
+        let arrays: Vec<_> = arrays.map(|(name, bytes)| (&buffers[name], 0, bytes)).collect();
+        self.device.upload_many(&arrays)
+    }
+
+    /// Simulates one frame of `scene` as it is now and returns the timings of the frames that have finished
+    /// since the last call. `index` is the frame's number and selects the noise.
+    /// Pose, placements and settings may differ from those of the frame before. Sizes (lines, samples, meshes,
+    /// tissues, points, image, acquired volume; paths where each has segments of its own) must not exceed those
+    /// at creation. A change of settings waits for the frames in flight.
+    ///
+    /// # Errors
+    /// A Vulkan error; a lost device names the last pass.
+    pub fn frame(&mut self, scene: &Scene, index: u32) -> Result<Vec<FrameTimings>, SimError> {
+        self.frames(scene, &[Shot::of(scene, index)])
+    }
+
+    /// Simulates a frame of several images in one submission: of the scene as it is now, from the place and with the
+    /// seed and number of each shot. Each is to the bit what [`Self::frame`] makes of it alone; labels say what has
+    /// moved since the image before it. Else as [`Self::frame`]; [`Self::choose`] says which image is read.
+    ///
+    /// # Errors
+    /// Those of [`Self::frame`]; device out of memory for as many images as [`Self::most_shots`] has not promised.
+    ///
+    /// # Panics
+    /// Without shots.
+    pub fn frames(&mut self, scene: &Scene, shots: &[Shot]) -> Result<Vec<FrameTimings>, SimError> {
+        self.make(scene, shots, None)
+    }
+
+    /// Makes images, or one line of them each.
+    fn make(
+        &mut self,
+        scene: &Scene,
+        shots: &[Shot],
+        line: Option<OneLine>,
+    ) -> Result<Vec<FrameTimings>, SimError> {
+        assert!(!shots.is_empty(), "a frame without images");
+        let exchanged = self.adopt(scene)?;
+        let labelled = scene.simulation.labels && line.is_none();
+        let levelled = labelled && scene.simulation.levelled();
+        let passes = &mut self.passes;
+        let mut cmd = self.submissions.begin()?;
+        let updated = passes.update(&mut cmd, scene, &self.tables, self.coincident, shots, line)?;
+        self.update_time = exchanged + updated;
+        passes.touch(&mut cmd, scene, shots)?;
+        let sizes = passes.batches.sizes(passes.frame(), &self.tables);
+        passes.clear(&mut cmd, &sizes);
+        passes.echoes(&mut cmd, levelled)?;
+        passes.run(&mut cmd, &BEAM)?;
+        passes.run(&mut cmd, &AXIAL)?;
+        // From here on the frame is not abandoned, so that the picture is replaced as a whole.
+        cmd.keep_on();
+        let fusion = scene.fusion.as_ref().filter(|_| line.is_none() && scene.shows_volume());
+        if fusion.is_none() {
+            passes.run(&mut cmd, &DISPLAY)?;
+        }
+        (self.labelled, self.levelled, self.chosen) = (labelled, levelled, 0);
+        if labelled {
+            passes.run(&mut cmd, &LABEL)?;
+            if levelled {
+                passes.surface_samples(&mut cmd)?;
+                passes.run(&mut cmd, &LEVEL)?;
+            }
+            passes.run(&mut cmd, &CHART)?;
+        }
+        if let Some(fusion) = fusion {
+            passes.fuse(&mut cmd, fusion)?;
+        }
+        self.fused = fusion.is_some();
+        if let Some(image) = &self.shown_on {
+            cmd.copy_to_image(passes.lanes[0].pixels(self.fused), image)?;
+        }
+        if let (Some((image, tint)), true) = (&self.tinted_on, self.fused) {
+            let tinted = passes.tint(&mut cmd, tint)?;
+            cmd.copy_to_image(tinted, image)?;
+        }
+        if let (Some((image, opacity)), true) = (&self.painted_on, labelled) {
+            let painted = passes.paint(&mut cmd, scene, *opacity, self.fused)?;
+            cmd.copy_to_image(painted, image)?;
+        }
+        passes.read_out(&mut cmd, &sizes)?;
+        cmd.submit()?;
+        if line.is_none() {
+            passes.shown = *passes.frame();
+        }
+        Ok(self.submissions.take_timings())
+    }
+
+    /// Sets the question by which frames and 3D views may be abandoned: `wanted_no_longer` is asked now and
+    /// then while they are recorded, and true means that something newer is wanted. They then fail with
+    /// [`GpuError::Abandoned`], and the last picture stays. Where the window shares the queue, recording a
+    /// frame takes about as long as the frame itself.
+    pub fn abandon_when(&mut self, wanted_no_longer: Option<Abandon>) {
+        self.submissions.abandon_when(wanted_no_longer);
+    }
+
+    /// Takes over settings, strategies and placements that the device does not have yet, after the
+    /// frames in flight. Returns the time for structures that had to be built again.
+    fn adopt(&mut self, scene: &Scene) -> Result<Duration, SimError> {
+        let sources = Sources::of(scene);
+        if sources != self.sources {
+            // The tables carry scales and levels that belong to the frame's constants.
+            self.submissions.wait()?;
+            let tables = self.table_cache.take(&sources);
+            let tables = tables.unwrap_or_else(|| Tables::new(scene));
+            let left = std::mem::replace(&mut self.tables, tables);
+            let before = std::mem::replace(&mut self.sources, sources);
+            self.table_cache.put(before, left);
+            // The others are made again when they are needed, with what the frame needs now.
+            self.passes.lanes.truncate(1);
+            (self.passes.active, self.chosen) = (1, 0);
+            self.passes.lanes[0].buffers.add(&self.device, stages::needed(scene))?;
+            self.upload_tables()?;
+        }
+        if self.passes.world.serves(scene) {
+            return Ok(Duration::ZERO);
+        }
+        self.submissions.wait()?;
+        let began = Instant::now();
+        self.passes.world.exchange(&self.device, scene)?;
+        Ok(began.elapsed())
+    }
+
+    /// True if the first frame will wait for the driver's compiler, because its kernels have never run here.
+    pub fn compiles(&self) -> bool {
+        self.passes.kernels.of(&SCATTER, self.passes.world.deforms()).is_new()
+    }
+
+    /// Builds the pipelines again from `library`'s kernels, after the frames in flight.
+    ///
+    /// # Errors
+    /// A kernel that the device refuses; the simulator keeps the ones that it had.
+    pub fn reload(&mut self, library: &Library) -> Result<(), SimError> {
+        self.submissions.wait()?;
+        let shapers = world::ShapeKernels::new(&self.device, library)?;
+        let world = &self.passes.world;
+        let kernels = &self.passes.kernels;
+        self.passes.kernels = kernels.again(&self.device, library, world, self.counting)?;
+        self.viewer3d = None;
+        self.passes.world.reload(shapers);
+        Ok(())
+    }
+
+    /// Switches to the kernels of the compute tracer that count their steps (`node_visits` and the fields
+    /// after it in [`Self::counters`]) if `counting`, else to those that do not. Counting makes rays slower.
+    ///
+    /// # Errors
+    /// A kernel that the device refuses.
+    ///
+    /// # Panics
+    /// With the ray query, whose steps cannot be counted.
+    pub fn count(&mut self, library: &Library, counting: bool) -> Result<(), SimError> {
+        assert_eq!(self.passes.world.tracer(), Tracer::Bvh, "what is counted");
+        self.counting = counting;
+        self.reload(library)
+    }
+
+    /// Processor time for recording the last frame's changes of the scene. Includes trees built for them, also
+    /// those of instances that have left the group with which they shared a structure.
+    pub fn update_time(&self) -> Duration {
+        self.update_time
+    }
+
+    /// The contact of the probe with the skin in the chosen image of the last frame; none where the scene asks for no contact.
+    pub fn contact(&self) -> Option<SkinContact> {
+        self.lane().touch
+    }
+
+    /// The device memory that the scene takes.
+    pub fn memory(&self) -> Memory {
+        let fusion = self.passes.lanes[0].fusion.as_ref();
+        Memory {
+            volume: fusion.map_or(0, FusionResources::volume_bytes),
+            ..self.passes.world.memory()
+        }
+    }
+
+    /// Waits for the frames in flight and returns their timings, oldest first.
+    ///
+    /// # Errors
+    /// A lost device, with the last pass that had begun.
+    pub fn wait(&mut self) -> Result<Vec<FrameTimings>, SimError> {
+        self.submissions.wait()?;
+        Ok(self.submissions.take_timings())
+    }
+
+    /// The constants of the chosen image of the last frame.
+    pub fn constants(&self) -> &layout::Frame {
+        &self.lane().frame
+    }
+
+    /// The tables as they are on the device.
+    pub fn tables(&self) -> &Tables {
+        &self.tables
+    }
+
+    /// The B-mode image of the last frame: width, height, RGBA bytes row by row; transparent outside
+    /// the sector.
+    ///
+    /// # Errors
+    /// A Vulkan error.
+    pub fn pixels(&mut self) -> Result<(u32, u32, Vec<u8>), SimError> {
+        let (width, height) = (self.constants().image_width, self.constants().image_height);
+        Ok((width, height, self.read_again(lane::pixels(self.fused))?))
+    }
+
+    /// A warning for the user about how the scene was uploaded, if there is one.
+    pub fn warning(&self) -> Option<&str> {
+        self.passes.lanes[0].fusion.as_ref().and_then(FusionResources::warning)
+    }
+}

@@ -1,0 +1,161 @@
+//! One drawing of the window.
+
+use std::time::{Duration, Instant};
+
+use super::{Open, gestures};
+use crate::bmode::Place;
+use crate::engine::Frame;
+use crate::gpu::{GpuError, InterfaceFrame, Painted, PlacedImage, Screenshot};
+use crate::layout::{self, Places};
+use crate::statistics::{Sample, Times};
+use crate::timing::costs;
+use crate::tools::cropped;
+use crate::{keys, mmode, real};
+
+/// Number of images of an animation after which a screenshot is taken.
+const SETTLED: usize = 24;
+
+impl Open {
+    /// Draws the window once; returns its pixels where they are wanted and there is an image.
+    pub(crate) fn paint(
+        &mut self,
+        times: &mut Times,
+        shot: bool,
+    ) -> Result<Option<Screenshot>, GpuError> {
+        let began = Instant::now();
+        let input = self.input.take_egui_input(&self.window);
+        let context = self.input.egui_ctx().clone();
+        let (model, state, touched) = (&mut self.model, &mut self.state, self.touched);
+        let pictured = self.pictured.as_ref();
+        let (mut shown, mut places) = (None, Places::default());
+        let mut output = egui::FullOutput::default();
+        for input in gestures::passes(input) {
+            output.append(context.run_ui(input, |ui| {
+                keys::apply(ui.ctx(), model, state, touched);
+                shown = state.tools.shown(model, ui.ctx());
+                let pictures = (shown.as_ref(), pictured);
+                places = layout::show(ui, model, state, times, pictures, touched);
+                model.note_marks(touched);
+            }));
+        }
+        self.tell();
+        self.point(&places, output.pixels_per_point);
+        self.entitle();
+        let platform = std::mem::take(&mut output.platform_output);
+        self.input.handle_platform_output(&self.window, platform);
+        let scale = output.pixels_per_point;
+        let primitives = context.tessellate(std::mem::take(&mut output.shapes), scale);
+        let model = &self.model;
+        let image = shown.as_ref().map(|frame| real::image(frame, model));
+        let held = self.state.dual.frame().map(|frame| real::image(frame, model));
+        let view3d = self.pictured.as_ref().map(|pictured| &pictured.image);
+        let seen = places.view3d.zip(self.pictured.as_ref());
+        let seen = seen.map(|(place, pictured)| place.of(pictured));
+        let within = |place: &Place| (place.rect, place.room, place.flipped);
+        let rects = [
+            (image, places.image.as_ref().map(within)),
+            (held, places.held.as_ref().map(within)),
+            (view3d, seen.map(|place| (place.rect, place.rect, [false; 2]))),
+        ];
+        let placed: Vec<PlacedImage> = (rects.into_iter())
+            .filter_map(|(image, rect)| {
+                let (rect, room, flipped) = rect?;
+                let sides = |r: egui::Rect| {
+                    let r = r * scale;
+                    [r.left(), r.top(), r.right(), r.bottom()]
+                };
+                let (to, within) = (sides(rect), sides(room));
+                Some(PlacedImage { image: image?, to, within, flipped })
+            })
+            .collect();
+        let size = self.window.inner_size();
+        let looked = self.pictured.as_ref().map(|pictured| &pictured.look);
+        // A running animation is never at rest: by then its quality has settled.
+        let settled = |frame: &Frame| match self.model.clock.runs() {
+            true => times.samples().len() >= SETTLED,
+            false => frame.grade.is_full(),
+        };
+        let shot = shot && shown.as_ref().is_some_and(settled) && looked == self.look.as_ref();
+        let interface = InterfaceFrame {
+            pixels_per_point: scale,
+            primitives: &primitives,
+            textures: std::mem::take(&mut output.textures_delta),
+        };
+        let size = [size.width, size.height];
+        let painter = &mut self.session.painter;
+        let tools = &mut self.state.tools;
+        let wanted = tools.wants_shot(&self.model, &self.state.dual) && painter.can_be_read();
+        let marked = wanted && tools.cleared;
+        let painted = painter.paint(size, &placed, interface, shot || marked)?;
+        self.session.engine.drawn();
+        let picture = match &painted {
+            Painted::Shown(picture) => picture.as_ref().filter(|_| marked),
+            Painted::Skipped => None,
+        };
+        let around = picture.zip(places.image.as_ref()).map(|(picture, place)| {
+            let both = places.held.as_ref().map_or(place.area, |held| place.area.union(held.area));
+            let r = both * scale;
+            cropped(picture, [r.left(), r.top(), r.right(), r.bottom()])
+        });
+        let strip = || mmode::saved(&self.model, &self.state.mmode);
+        let study = || self.state.exam.study(self.model.settings.imaging.exam);
+        // Asked for while it was drawn: the next drawing is the one without buttons.
+        match wanted && !marked {
+            true => context.request_repaint(),
+            false => tools.save(&self.model, around, strip, study),
+        }
+        self.painted = (began, began.elapsed());
+        self.schedule(&output);
+        match painted {
+            Painted::Shown(picture) => {
+                self.seen(times);
+                Ok(picture.filter(|_| shot))
+            }
+            Painted::Skipped => Ok(None),
+        }
+    }
+
+    /// Sends the view of the anatomy to the simulation.
+    fn point(&mut self, places: &Places, scale: f32) {
+        let (model, state) = (&self.model, &self.state.view3d);
+        let look = (places.view3d).map(|place| place.look(model, state, scale));
+        if look != self.look {
+            if look.is_none() {
+                self.pictured = None;
+            }
+            self.session.engine.look(look.clone());
+            self.look = look;
+        }
+    }
+
+    /// Plans the next drawing that the interface wants.
+    fn schedule(&mut self, output: &egui::FullOutput) {
+        let root = output.viewport_output.get(&egui::ViewportId::ROOT);
+        let delay = root.map_or(Duration::MAX, |root| root.repaint_delay);
+        let now = Instant::now();
+        // Later than an instant can hold: never.
+        self.again = now.checked_add(delay).filter(|_| !delay.is_zero());
+        if delay.is_zero() {
+            self.draw_soon(now);
+        }
+    }
+
+    /// Notes that the picture has been handed to the screen.
+    fn seen(&mut self, times: &mut Times) {
+        (self.pictures_ms.drain(..)).for_each(|ms| times.add_view3d(ms));
+        times.add_unseen(std::mem::take(&mut self.unseen));
+        if !std::mem::take(&mut self.fresh) {
+            return;
+        }
+        if let Some(frame) = &self.frame {
+            times.add(Sample {
+                stages: frame.timings.passes.clone(),
+                wall: frame.wall_ms,
+                update: frame.update_ms,
+                strategy: costs::strategies(&frame.settings.strategies),
+                latency: frame.at.elapsed().as_secs_f64() * 1e3,
+                grade: Some(frame.grade.clone()),
+            });
+        }
+    }
+}
