@@ -50,7 +50,7 @@ use insonify::sim::stages;
 pub use run::run;
 
 /// The kinds of inputs.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Case {
     /// Random numbers in a plausible frame.
     Random,

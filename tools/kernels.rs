@@ -50,7 +50,11 @@ enum Command {
         size: Extent,
     },
     /// Runs every kernel on every case; fails where one differs from its twin.
-    Check,
+    Check {
+        /// Cases [default: all].
+        #[arg(long = "case", value_enum)]
+        cases: Vec<Case>,
+    },
     /// Compiles every kernel and variant, each in a process of its own; fails where the driver's compiler ends its
     /// process. Other widths of Mesa's vectors: LP_NATIVE_VECTOR_WIDTH, with a MESA_SHADER_CACHE_DIR of its own.
     Compile,
@@ -94,7 +98,8 @@ fn program() -> Result<ExitCode> {
             };
             run(&device, &library, subject, size, input.as_deref(), output.as_deref())?
         }
-        Command::Check => check(&device, &library)?,
+        Command::Check { cases } if cases.is_empty() => check(&device, &library, &Case::ALL)?,
+        Command::Check { cases } => check(&device, &library, &cases)?,
         Command::Compile => compile(&device, &library),
     };
     let messages = device.validation_messages();
@@ -179,11 +184,11 @@ fn run(
     Ok(passed)
 }
 
-fn check(device: &Arc<Device>, library: &Library) -> Result<bool> {
+fn check(device: &Arc<Device>, library: &Library, cases: &[Case]) -> Result<bool> {
     let mut passed = true;
     for subject in &SUBJECTS {
         for kernel in kernels(device, library, subject)? {
-            for case in Case::ALL {
+            for &case in cases {
                 let job = (subject.job)(case, Size::Small);
                 let extent = subject.extent(&job);
                 let outcome = harness::run(device, &kernel, &job, &extent).into_diagnostic()?;

@@ -21,8 +21,8 @@ if [ ! -f "$wanted" ] || [ "$(cat "$wanted")" != "${packages[*]}" ]; then
   fi
   echo "${packages[*]}" >"$wanted"
 fi
-# One set of features with the other tests: only the module itself is built anew.
-cargo build --features "${FEATURES:-anatomy}"
+# One set of features with the other tests: only the module itself is built anew, and the program that its tests compare it with.
+cargo build --features "${FEATURES:-anatomy}" --lib --bin insonify
 cp target/debug/lib_insonify.so python/insonify/_insonify.abi3.so
 "$python" -m mypy --no-error-summary --cache-dir target/mypy python/insonify
 PYTHONPATH=$PWD/python "$python" -m pytest -q -rfEs -p no:cacheprovider python/tests "$@"

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Every test, with all set-up that they need, but for those that compile kernels: `--features compile`
 # adds them, with SHADERC_LIB_DIR set as in .ci/run. As the first argument, `--long` adds the tests
-# that take minutes or need a quiet machine: statistics over many seeds, how little the processor does for a
-# window at rest. Other arguments go to `cargo test`; those of the Python package (tools/python.sh) follow unless the
+# that take minutes or need a quiet machine: statistics over many seeds, physics by both tracers, every kernel on a second
+# driver in every case, how little the processor does for a window at rest. Other arguments go to `cargo test`; those of the Python package (tools/python.sh) follow unless the
 # arguments choose tests.
 #
 # The last lines say, a line each, which programs passed, failed or died and how long they took, which tests were
@@ -19,6 +19,8 @@ long=()
 if [ "${1:-}" = --long ]; then
   shift
   long=(--include-ignored)
+  # Physics by both tracers (tests/physics/check.rs), the second driver on every case (tools/tests/kernels.rs).
+  export INSONIFY_LONG=1
 fi
 mkdir -p target/report
 report=$PWD/target/report

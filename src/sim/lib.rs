@@ -5,7 +5,7 @@
 //! use insonify_scene::scene::Scene;
 //! use insonify_sim::{Simulator, Tracer, shaders::Library};
 //!
-//! let (scene, _warnings) = Scene::load("scenes/abdomen.toml", &[])?;
+//! let (scene, _warnings) = Scene::load("scenes/abdomen.toml".as_ref(), &[])?;
 //! let device = Device::new(&DeviceOptions::default())?;
 //! let mut simulator = Simulator::new(&device, &Library::embedded(), &scene, Tracer::Bvh)?;
 //! simulator.frame(&scene, 0)?;

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use insonify::gpu;
 pub use insonify::output::plot::{Curve, Plot};
+use insonify::sim::Tracer;
 
 use crate::physics::render::{Renderer, renderers};
 
@@ -124,18 +125,28 @@ impl Outcome {
 /// The device and the renderers for checks.
 pub struct Bench {
     pub device: Arc<gpu::Device>,
-    /// The f64 twins, and the device with either tracer.
-    pub renderers: [Renderer; 3],
+    /// Those by which paths are followed: of the report and of long runs both. Others have the compute tracer alone where the
+    /// subject is what sound does and not who finds the surfaces: that both find the same and show the same is proven by itself.
+    pub tracers: &'static [Tracer],
+    /// The f64 twins, and the device with each of the tracers.
+    pub renderers: Vec<Renderer>,
 }
+
+const TRACERS: [Tracer; 2] = [Tracer::Bvh, Tracer::RayQuery];
 
 impl Bench {
     #[cfg(test)]
     pub fn new() -> Self {
-        Self::on(gpu::test_device().clone())
+        let long = std::env::var_os("INSONIFY_LONG").is_some();
+        Self::with(gpu::test_device().clone(), if long { &TRACERS } else { &TRACERS[..1] })
     }
 
     pub fn on(device: Arc<gpu::Device>) -> Self {
-        Self { renderers: renderers(&device), device }
+        Self::with(device, &TRACERS)
+    }
+
+    fn with(device: Arc<gpu::Device>, tracers: &'static [Tracer]) -> Self {
+        Self { renderers: renderers(&device, tracers), device, tracers }
     }
 }
 

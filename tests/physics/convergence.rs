@@ -5,7 +5,7 @@ use insonify::scene::Scene;
 use insonify::settings::{Sampling, Sequence};
 
 use crate::physics::check::{Bench, Check, Curve, Outcome, Physics, Plot};
-use crate::physics::paths::{Range, TRACERS};
+use crate::physics::paths::Range;
 use crate::physics::scenes::{add_box, add_layer, linear, silent};
 
 /// Check T24, the error at finite N.
@@ -129,7 +129,7 @@ fn convergence(bench: &Bench, physics: Physics) -> Outcome {
     };
     let rough = [1, 2, 4, 8, 16, 32, 64, 128, 256];
     let hidden = [3, 6, 12, 24, 48, 96];
-    for tracer in TRACERS {
+    for &tracer in bench.tracers {
         for (name, scene, paths, expected) in [
             (
                 "independent paths, independent numbers",
@@ -156,7 +156,7 @@ fn convergence(bench: &Bench, physics: Physics) -> Outcome {
             let slope = exponent(&points).max(expected);
             let what = format!("{tracer}, {name}: exponent of N, or {expected}");
             out.compare(what, slope, expected, 0.1).unlike("independent choices", -0.5);
-            if tracer == TRACERS[0] {
+            if tracer == bench.tracers[0] {
                 let law =
                     |p: &[f64; 2]| [p[0], points[0][1] * (p[0] / points[0][0]).powf(expected)];
                 plot.curves.push(Curve {

@@ -7,7 +7,7 @@ use insonify::settings::Sampling;
 use insonify_tools::reference::Segment;
 
 use crate::physics::check::{Bench, Check, Curve, Outcome, Physics, Plot};
-use crate::physics::paths::{Range, TRACERS};
+use crate::physics::paths::Range;
 use crate::physics::render::Inputs;
 use crate::physics::scenes::{add_layer, add_point, linear, silent};
 
@@ -164,7 +164,7 @@ fn audit(bench: &Bench, physics: Physics) -> Outcome {
             "twins".to_owned(),
             seeds(&mut |scene| Inputs::new(scene).traced().segments.concat()),
         )];
-        for tracer in TRACERS {
+        for &tracer in bench.tracers {
             let mut range = Range::new(bench, &layers(sampling), tracer);
             let frames = seeds(&mut |scene| range.shoot(scene).segments.concat());
             results.push((tracer.to_string(), frames));

@@ -6,7 +6,7 @@ use insonify_tools::reference::Segment;
 use serde_json::Value;
 
 use crate::physics::check::{Bench, Check, Curve, Outcome, Physics, Plot};
-use crate::physics::paths::{TRACERS, centroid, echo};
+use crate::physics::paths::{centroid, echo};
 use crate::physics::refraction::{AXIS, RADIUS, offset, rays, traced};
 use crate::physics::reverberation::mean_line;
 use crate::physics::scenes::{add_layer, linear, silent};
@@ -83,7 +83,7 @@ fn slab_echoes(bench: &Bench, physics: Physics) -> Outcome {
             (0..3).map(|m| [m as f64, number(&table["echoes"][m]["amplitude"])]).collect(),
         ),
     ];
-    for tracer in TRACERS {
+    for &tracer in bench.tracers {
         let line = mean_line(bench, &scene, tracer);
         let place = |m: usize| {
             let time = first + m as f64 * inside;

@@ -8,7 +8,7 @@ use insonify::sim::Tracer;
 use insonify_tools::reference::Segment;
 
 use crate::physics::check::{Bench, Check, Curve, Outcome, Physics, Plot};
-use crate::physics::paths::{Range, TRACERS};
+use crate::physics::paths::Range;
 use crate::physics::refraction::traced;
 use crate::physics::render::{Inputs, angle};
 use crate::physics::scenes::{add_box, add_layer, add_point, linear, silent, tissue};
@@ -72,7 +72,9 @@ type Passage = (Tracer, [f64; 2], [f64; 2], f64, Option<Segment>);
 
 fn passages(bench: &Bench, [speed, impedance]: [f64; 2]) -> Vec<Passage> {
     let mut all = vec![];
-    for ([a, b], tracer) in PAIRS.into_iter().flat_map(|p| TRACERS.map(|t| (p, t))) {
+    for ([a, b], tracer) in
+        PAIRS.into_iter().flat_map(|p| bench.tracers.iter().map(move |&t| (p, t)))
+    {
         let (before, behind) = (FLUIDS[a], FLUIDS[b]);
         let scene = fan(before, [speed * behind[0], impedance * behind[1]]);
         let shot = Range::new(bench, &scene, tracer).shoot(&scene);
@@ -144,7 +146,7 @@ fn fresnel_law(bench: &Bench, physics: Physics) -> Outcome {
     let what = "twins: largest deviation of the transmission, of what is allowed";
     out.compare(what, worst, 0.0, 1.0);
     let passages = passages(bench, [1.0, planted]);
-    for tracer in TRACERS {
+    for &tracer in bench.tracers {
         let own = passages.iter().filter(|p| p.0 == tracer);
         let error = |&(_, a, b, incidence, through): &Passage| {
             fresnel_error(through.map_or(0.0, |s| s.weight), a, b, incidence.abs())
@@ -217,7 +219,7 @@ fn snells_law(bench: &Bench, physics: Physics) -> Outcome {
     }
     out.compare("twins: largest error of refraction, rad", worst, 0.0, 1e-5);
     let passages = passages(bench, [planted, 1.0]);
-    for tracer in TRACERS {
+    for &tracer in bench.tracers {
         let own = passages.iter().filter(|p| p.0 == tracer);
         let error = |&(_, a, b, incidence, through): &Passage| {
             // The fan bends to both sides of the wall's normal.

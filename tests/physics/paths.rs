@@ -9,9 +9,6 @@ use insonify_tools::reference::Segment;
 
 use crate::physics::check::Bench;
 
-/// Both tracers.
-pub const TRACERS: [Tracer; 2] = [Tracer::Bvh, Tracer::RayQuery];
-
 /// The paths of one frame.
 pub struct Shot {
     /// Surface echoes before the lateral stage, complex, relative to a perfect mirror: [scanline][sample].

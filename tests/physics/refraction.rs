@@ -8,7 +8,7 @@ use insonify::settings::{Loss, Refraction};
 use insonify_tools::reference::Segment;
 
 use crate::physics::check::{Bench, Check, Curve, Outcome, Physics, Picture, Plot};
-use crate::physics::paths::{Range, TRACERS};
+use crate::physics::paths::Range;
 use crate::physics::pictures::shown;
 use crate::physics::render::Inputs;
 use crate::physics::scenes::{add_point, linear, mirror, silent, tissue};
@@ -75,7 +75,7 @@ pub fn rays(lines: u32, between: [f64; 2], inside: f64) -> Scene {
 /// Segments of every scanline, in order of time, by the twins and the tracers.
 pub fn traced(bench: &Bench, scene: &Scene) -> Vec<(String, Vec<Vec<Segment>>)> {
     let mut all = vec![("twins".to_owned(), Inputs::new(scene).traced().segments)];
-    for tracer in TRACERS {
+    for &tracer in bench.tracers {
         let shot = Range::new(bench, scene, tracer).shoot(scene);
         all.push((tracer.to_string(), shot.segments));
     }

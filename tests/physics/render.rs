@@ -127,14 +127,15 @@ pub fn twin_of(scene: &Scene, change: impl Fn(&mut Segment)) -> Frame {
 /// A renderer of frames, with its name.
 pub type Renderer = (&'static str, Box<dyn Fn(&Scene) -> Frame>);
 
-/// The twins, and the device with either tracer.
-pub fn renderers(device: &Arc<gpu::Device>) -> [Renderer; 3] {
-    let (device, other) = (device.clone(), device.clone());
-    [
-        ("twins", Box::new(twin)),
-        ("bvh", Box::new(move |s| on(&device, s, Tracer::Bvh))),
-        ("query", Box::new(move |s| on(&other, s, Tracer::RayQuery))),
-    ]
+/// The twins, and the device with each of the tracers.
+pub fn renderers(device: &Arc<gpu::Device>, tracers: &[Tracer]) -> Vec<Renderer> {
+    let mut all: Vec<Renderer> = vec![("twins", Box::new(twin))];
+    for &tracer in tracers {
+        let device = device.clone();
+        let name = if tracer == Tracer::Bvh { "bvh" } else { "query" };
+        all.push((name, Box::new(move |s| on(&device, s, tracer))));
+    }
+    all
 }
 
 /// The frame of `scene` by the device. Nothing may be lost on the way, and validation is silent.

@@ -6,7 +6,7 @@ use insonify::settings::Sampling;
 use insonify::sim::Tracer;
 
 use crate::physics::check::{Bench, Check, Curve, Outcome, Physics, Plot};
-use crate::physics::paths::{Range, TRACERS, centroid, echo};
+use crate::physics::paths::{Range, centroid, echo};
 use crate::physics::pictures::shown;
 use crate::physics::scenes::{add_box, add_layer, add_point, linear, silent};
 
@@ -99,7 +99,7 @@ fn reverberation(bench: &Bench, physics: Physics) -> Outcome {
             line: true,
         }],
     };
-    for tracer in TRACERS {
+    for &tracer in bench.tracers {
         for sampling in [Sampling::MainPath, Sampling::Plain, Sampling::SharedPrimary] {
             let scene = slab(sampling, back);
             let line = mean_line(bench, &scene, tracer);

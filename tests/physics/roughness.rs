@@ -8,7 +8,7 @@ use insonify_tools::reference::acoustics::power_cosine;
 use insonify_tools::reference::random::{PURPOSE_NORMAL, path_random, unit};
 
 use crate::physics::check::{Bench, Check, Curve, Outcome, Physics, Plot};
-use crate::physics::paths::{Range, TRACERS, echo};
+use crate::physics::paths::{Range, echo};
 use crate::physics::scenes::{add_layer, add_point, linear, silent};
 
 const PATHS: u32 = 16384;
@@ -88,7 +88,7 @@ fn lobe(bench: &Bench, physics: Physics) -> Outcome {
             logarithmic: [false, false],
             curves: vec![density(s)],
         };
-        for tracer in TRACERS {
+        for &tracer in bench.tracers {
             let scene = wall(truth(s), n);
             let shot = Range::new(bench, &scene, tracer).shoot(&scene);
             let up = shot.segments[0].iter().filter(|g| g.direction.z < 0.0);

@@ -8,7 +8,7 @@ use insonify::settings::{Coherence, Sampling};
 use insonify::sim::Tracer;
 
 use crate::physics::check::{Bench, Check, Curve, Outcome, Physics, Plot};
-use crate::physics::paths::{Range, TRACERS, echo};
+use crate::physics::paths::{Range, echo};
 use crate::physics::scenes::{add_box, linear, silent};
 
 /// Frequency, MHz; and speed to which the machine and, unless stated, the medium are set, mm/us.
@@ -98,7 +98,7 @@ fn delays(bench: &Bench, physics: Physics) -> Outcome {
             samples * samples * (1.0 - 2.0 / PI) + 0.117_099,
         ];
         let mut plot = profile(tau, samples);
-        for tracer in TRACERS {
+        for &tracer in bench.tracers {
             // Scanlines 8 mm apart: no two share a cell of the phase, nor a beam.
             let mut scene = wall(128, 8.0, speed, thicker(physics, tau));
             // Each path echoes: there are as many depths as paths.
@@ -204,7 +204,7 @@ fn coherence(bench: &Bench, physics: Physics) -> Outcome {
             line: true,
         }],
     };
-    for tracer in TRACERS {
+    for &tracer in bench.tracers {
         for (name, measure) in [("summed", summed as fn(&Bench, _, _, _) -> f64), ("split", split)]
         {
             let measured = THICKNESSES
@@ -271,7 +271,7 @@ fn energies(bench: &Bench, physics: Physics, out: &mut Outcome) {
             line: true,
         }],
     };
-    for tracer in TRACERS {
+    for &tracer in bench.tracers {
         let energy = |scene: &Scene| {
             let iq = Range::new(bench, scene, tracer).iq(scene);
             let power = iq.iter().flatten().map(|v| v[0].powi(2) + v[1].powi(2));
