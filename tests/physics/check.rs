@@ -141,6 +141,8 @@ impl Bench {
         Self::with(gpu::test_device().clone(), if long { &TRACERS } else { &TRACERS[..1] })
     }
 
+    /// For the report.
+    #[cfg_attr(test, allow(dead_code))]
     pub fn on(device: Arc<gpu::Device>) -> Self {
         Self::with(device, &TRACERS)
     }

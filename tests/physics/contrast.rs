@@ -97,8 +97,10 @@ const BOX: [f64; 2] = [35.0, 85.0];
 // are a few hundredths of the overlap's width, and chance adds 0.01: 0.03 for gCNR.
 fn echogenicity(bench: &Bench, physics: Physics) -> Outcome {
     let mut out = Outcome::default();
-    let mut pairs = [Vec::new(), Vec::new()];
+    let law = vec![[-15.0, -15.0], [12.0, 12.0]];
+    let mut curves = vec![Curve::line("10 log10(v1 / v2)", law)];
     for (name, render) in &bench.renderers[1..] {
+        let mut pairs = Vec::new();
         for (contrast, density, ratio) in [(-6.0, 1.0, 0.0), (-12.0, 0.3, 0.0), (9.0, 0.3, 1.0)] {
             let mut scene = homogeneous(64, 1.0, 1);
             let missing = if physics == Physics::Planted { decibel(density) } else { 0.0 };
@@ -117,7 +119,7 @@ fn echogenicity(bench: &Bench, physics: Physics) -> Outcome {
             let what = format!("{name}: contrast of density {density}, mean {ratio} sigma; dB");
             let figure = out.compare(what, measured, contrast, 0.3);
             figure.unlike("amplitudes for powers", contrast / 2.0);
-            pairs[usize::from(name != &"bvh")].push([contrast, measured]);
+            pairs.push([contrast, measured]);
             if density == 1.0 {
                 let overlap = |decibels: f64| {
                     let c = 10f64.powf(decibels / 10.0);
@@ -130,13 +132,8 @@ fn echogenicity(bench: &Bench, physics: Physics) -> Outcome {
                     .unlike("amplitudes for powers", overlap(contrast / 2.0));
             }
         }
+        curves.push(Curve::dots(*name, pairs));
     }
-    let [bvh, query] = pairs;
-    let curves = vec![
-        Curve::line("10 log10(v1 / v2)", vec![[-15.0, -15.0], [12.0, 12.0]]),
-        Curve::dots("bvh", bvh),
-        Curve::dots("query", query),
-    ];
     let axes = ["stated contrast, dB", "measured contrast, dB"];
     out.plots.push(Plot::linear("Contrast of two tissues", axes, curves));
     out
