@@ -1,5 +1,5 @@
-//! What every part of insonify stands on, and what knows nothing of ultrasound, scenes or devices: errors about files, what is
-//! written, random numbers by counters, statistics.
+//! Errors about files, what is written, random numbers by counters, statistics: what every part of insonify stands on. It knows
+//! nothing of ultrasound, scenes or devices.
 
 #![warn(missing_docs)]
 

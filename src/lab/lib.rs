@@ -1,5 +1,5 @@
-//! What is done with images and scenes beside looking at them: data sets, sweeps, examinations, studies, teaching, fitting and
-//! registration to acquired volumes, segmentations made into scenes, and files and links of others. It knows no window.
+//! Data sets, sweeps, examinations, studies, teaching, fitting and registration to acquired volumes, segmentations made into
+//! scenes, files and links of others: what is done with images and scenes beside looking at them. It knows no window.
 
 #![warn(missing_docs)]
 

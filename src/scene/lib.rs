@@ -1,4 +1,4 @@
-//! What is imaged, and by which probe: settings, scene files, meshes, motion, acquired volumes. It knows no Vulkan.
+//! Settings, scene files, meshes, motion, probes, acquired volumes: what is imaged, and by which probe. It knows no Vulkan.
 
 #![warn(missing_docs)]
 

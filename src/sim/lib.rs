@@ -46,6 +46,7 @@ mod rf;
 pub mod rounds;
 pub mod seen;
 pub mod shaders;
+mod sources;
 pub mod special;
 pub mod stages;
 pub mod tables;
@@ -62,8 +63,8 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use crate::gpu::{Abandon, AdapterKind, Device, FrameTimings, Frames, GpuError, Image};
-use crate::scene::{Scene, Surface, Tissue, Wire};
-use crate::settings::{Machine, Settings};
+use crate::scene::Scene;
+use crate::settings::Machine;
 use batches::FrameBudget;
 use bvh::Splits;
 use contact::SkinContact;
@@ -75,6 +76,7 @@ pub use memory::Memory;
 use passes::{PassKernels, Passes, frame_constants};
 pub use resize::image_size;
 use shaders::Library;
+use sources::{Sources, TableCache};
 use stages::{AXIAL, BEAM, CHART, DISPLAY, LABEL, LEVEL, SCATTER};
 use tables::Tables;
 pub use tracer::Tracer;
@@ -125,50 +127,6 @@ pub struct Simulator {
     /// The image of the last frame whose results are read.
     chosen: usize,
     update_time: Duration,
-}
-
-/// Tables of settings used before, kept because settings come back: live quality changes between levels.
-#[derive(Default)]
-struct TableCache(Vec<(Sources, Tables)>);
-
-impl TableCache {
-    /// Most tables kept: more than there are levels of quality.
-    const MOST: usize = 12;
-
-    fn take(&mut self, sources: &Sources) -> Option<Tables> {
-        let at = self.0.iter().position(|(made_of, _)| made_of == sources)?;
-        Some(self.0.remove(at).1)
-    }
-
-    fn put(&mut self, sources: Sources, tables: Tables) {
-        if self.0.len() == Self::MOST {
-            self.0.remove(0);
-        }
-        self.0.push((sources, tables));
-    }
-}
-
-/// The settings from which the tables on the device were made.
-#[derive(PartialEq)]
-struct Sources {
-    settings: Settings,
-    tissues: Vec<Tissue>,
-    surfaces: Vec<[Surface; 2]>,
-    wires: Vec<Wire>,
-}
-
-impl Sources {
-    fn of(scene: &Scene) -> Self {
-        let mut settings = scene.settings.clone();
-        // Seeds are no part of the tables.
-        settings.simulation.seed = 0;
-        Self {
-            settings,
-            tissues: scene.tissues.clone(),
-            surfaces: scene.instances.iter().map(|i| i.surface).collect(),
-            wires: scene.wires.clone(),
-        }
-    }
 }
 
 impl Simulator {

@@ -132,7 +132,8 @@ pub struct Bench {
     pub renderers: Vec<Renderer>,
 }
 
-const TRACERS: [Tracer; 2] = [Tracer::Bvh, Tracer::RayQuery];
+/// Both tracers.
+pub const TRACERS: [Tracer; 2] = [Tracer::Bvh, Tracer::RayQuery];
 
 impl Bench {
     #[cfg(test)]

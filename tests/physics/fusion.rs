@@ -12,10 +12,8 @@ use insonify::sim::fusion::FusionSteps;
 use insonify::sim::{Simulator, Tracer, shaders::Library};
 use insonify::volume::Voxels;
 
-use crate::physics::check::{Bench, Check, Curve, Outcome, Physics, Picture, Plot};
+use crate::physics::check::{Bench, Check, Curve, Outcome, Physics, Picture, Plot, TRACERS};
 use crate::physics::scenes::{add_body, add_box, add_sphere, linear, silent, tissue};
-
-const TRACERS: [Tracer; 2] = [Tracer::Bvh, Tracer::RayQuery];
 
 /// The steps of the frame, its grey levels (none where transparent), and their width.
 struct Fused {

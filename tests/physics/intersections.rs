@@ -7,14 +7,12 @@ use insonify::scene::{Scene, shapes};
 use insonify::sim::tracer::Tracer;
 use rayon::prelude::*;
 
-use crate::physics::check::{Bench, Check, Curve, Outcome, Physics, Plot};
+use crate::physics::check::{Bench, Check, Curve, Outcome, Physics, Plot, TRACERS};
 use compare::{by_aim, expected, slips, wrong};
 use device::{Rig, Traced};
 use rays::{Ray, aimed_at_seams, baked, mirrored, placement, rays, scene, turned};
 
 use crate::common::crossings::{compare, device, rays};
-
-pub const TRACERS: [Tracer; 2] = [Tracer::Bvh, Tracer::RayQuery];
 
 /// Check T31.
 pub fn placements_are_transforms_of_the_mesh() -> Check {

@@ -9,8 +9,7 @@ use crate::common::crossings::beating::{KEYFRAMES, beating, show, strategies, un
 use crate::common::crossings::compare::{by_aim, expected, slips, wrong};
 use crate::common::crossings::device::Rig;
 use crate::common::crossings::rays::{Ray, rays};
-use crate::physics::check::{Bench, Check, Curve, Outcome, Physics, Plot};
-use crate::physics::intersections::TRACERS;
+use crate::physics::check::{Bench, Check, Curve, Outcome, Physics, Plot, TRACERS};
 
 /// Check T32.
 pub fn every_strategy_shows_the_keyframe() -> Check {

@@ -81,7 +81,7 @@ impl<'a> Field<'a> {
         found
     }
 
-    /// How the present place depends on the reference point, at `p`; its determinant is present volume over volume at rest.
+    /// The derivative of the present place by the reference point, at `p`; its determinant is present volume over volume at rest.
     pub fn jacobian(&self, p: DVec3) -> DMat3 {
         DMat3::IDENTITY + self.with_gradient(p).1
     }
