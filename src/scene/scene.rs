@@ -15,14 +15,19 @@ pub mod file;
 mod formats;
 pub mod fusion;
 pub mod graph;
+mod instance;
 pub mod keyframes;
 mod load_gltf;
 mod load_obj;
+mod masks;
 pub mod mesh;
+mod moment;
 pub mod normals;
 mod orientation;
 mod origin;
 pub mod palette;
+mod poses;
+mod shape;
 pub mod shapes;
 pub mod shipped;
 pub mod silent;
@@ -33,118 +38,26 @@ pub mod topology;
 pub mod tracker;
 pub mod triangle;
 pub mod vary;
+mod wire;
 
 pub use crate::issue::{Issue, Severity, Warning};
 pub use contact::Contact;
 pub use file::SceneError;
 pub use fusion::Acquired;
 pub use graph::Graph;
+pub use instance::Instance;
 pub use keyframes::{Keyframes, Strategy};
+pub use mesh::Mesh;
 pub use orientation::Orientation;
 pub use origin::{Origin, Origins};
+pub use poses::NamedPose;
 pub use task::Task;
 pub use tracker::Tracker;
+pub use wire::Wire;
 
 use crate::probe::Probe;
 use crate::settings::Settings;
 pub use crate::settings::{Display, Fusion, Imaging, Live, Simulation, Surface, Tissue};
-
-/// A triangle mesh in its own object space, mm.
-#[derive(Clone, Debug, Default)]
-pub struct Mesh {
-    /// Name as it appears in messages: the scene's mesh name, or the node's name in the file.
-    pub name: String,
-    /// Vertex positions, mm.
-    pub positions: Vec<[f32; 3]>,
-    /// Unit shading normals, one per vertex, outward; vertices are split at creases.
-    pub normals: Vec<[f32; 3]>,
-    /// Vertex indices, counter-clockwise seen from outside.
-    pub triangles: Vec<[u32; 3]>,
-}
-
-impl Mesh {
-    /// Smallest and largest corner of the triangles, mm; zero without any.
-    pub fn bounds(&self) -> [[f32; 3]; 2] {
-        let corners = self.triangles.iter().flatten();
-        let mut positions = corners.map(|&v| self.positions[v as usize]);
-        let Some(first) = positions.next() else {
-            return [[0.0; 3]; 2];
-        };
-        positions.fold([first; 2], |[low, high], p| {
-            let pick = |f: fn(f32, f32) -> f32, a: [f32; 3]| std::array::from_fn(|i| f(a[i], p[i]));
-            [pick(f32::min, low), pick(f32::max, high)]
-        })
-    }
-}
-
-/// One placed mesh with the tissue that it encloses.
-#[derive(Clone, Debug)]
-pub struct Instance {
-    /// Name in messages and label lists.
-    pub name: String,
-    /// The present shape: index into [`Scene::meshes`].
-    pub mesh: usize,
-    /// Shapes over time; none for a constant one.
-    pub keyframes: Keyframes,
-    /// True where it is in the scene now: selectors leave out all subtrees but one.
-    pub shown: bool,
-    /// Index into [`Scene::tissues`].
-    pub tissue: usize,
-    /// Priority where enclosed volumes overlap: the highest wins; ties go to the one entered last.
-    pub priority: i32,
-    /// World from object space, mm.
-    pub world_from_object: DAffine3,
-    /// Echo properties from outside and from inside.
-    pub surface: [Surface; 2],
-}
-
-/// A string of point scatterers along a straight line (a wire of a phantom), or a single point.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Wire {
-    /// Ends in world space, mm; equal ends make one point.
-    pub ends: [[f64; 3]; 2],
-    /// Spacing of the points along the wire, mm.
-    pub spacing: f64,
-    /// Amplitude of each point relative to a perfect flat mirror.
-    pub amplitude: f64,
-}
-
-impl Wire {
-    /// Most points of all wires of a scene file, and of one wire that the model's scale makes longer meanwhile.
-    pub const MOST: u32 = 1_000_000;
-
-    /// Stretches between its points: of `spacing` each, rounded so that both ends have a point; none of a
-    /// single point.
-    pub fn steps(&self) -> u32 {
-        match self.stretches() {
-            0.0 => 0,
-            steps => steps.clamp(1.0, f64::from(Self::MOST - 1)) as u32,
-        }
-    }
-
-    /// The same without an end.
-    fn stretches(&self) -> f64 {
-        let [a, b] = self.ends.map(glam::DVec3::from);
-        match a.distance(b) {
-            0.0 => 0.0,
-            length => (length / self.spacing).round().max(1.0),
-        }
-    }
-
-    /// Points that `spacing` asks for.
-    pub(crate) fn asks_for(&self) -> f64 {
-        self.stretches() + 1.0
-    }
-}
-
-/// A pose of the probe with a name: a standard view, a structure that is seen from there.
-#[derive(Clone, Debug, PartialEq)]
-pub struct NamedPose {
-    /// Its name, once in a scene.
-    pub name: String,
-    /// World from probe space, rigid, mm.
-    pub world_from_probe: DAffine3,
-}
 
 /// Everything that a frame depends on.
 #[derive(Clone, Debug)]

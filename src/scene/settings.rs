@@ -36,21 +36,64 @@ pub use value::{Value, plain};
 pub use words::Words;
 pub(crate) use words::words;
 
-/// Settings of imaging: those that presets, parameter studies, qualities and the console set alike.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Settings {
+/// What is done with each group of [`Settings`].
+pub trait Visitor {
+    /// Does it with one of them.
+    fn visit<T: Group>(&mut self, group: &T);
+}
+
+macro_rules! settings {
+    ($($(#[$doc:meta])+ $field:ident: $of:ty;)+) => {
+        /// Settings of imaging: those that presets, parameter studies, qualities and the console set alike.
+        #[derive(Clone, Debug, PartialEq)]
+        pub struct Settings {
+            $($(#[$doc])+ pub $field: $of,)+
+        }
+
+        impl Settings {
+            /// The tables of scene files that have them.
+            pub const TABLES: &'static [&'static str] = &[$(<$of as Group>::TABLE),+];
+
+            /// Does something with each group, in the order of [`Self::TABLES`].
+            pub fn each(&self, visitor: &mut impl Visitor) {
+                $(visitor.visit(&self.$field);)+
+            }
+        }
+    };
+}
+
+settings! {
     /// Transducer and its geometry.
-    pub probe: Probe,
+    probe: Probe;
     /// Path tracing and scatterers.
-    pub simulation: Simulation,
+    simulation: Simulation;
     /// Image formation.
-    pub imaging: Imaging,
+    imaging: Imaging;
 }
 
 impl Settings {
     /// The defaults, for a probe.
     pub fn of(probe: Probe) -> Self {
         Self { probe, simulation: Simulation::default(), imaging: Imaging::default() }
+    }
+
+    /// The value of a key of a table; none where the table is not among these or has no such key.
+    pub fn value(&self, table: &str, key: &str) -> Option<Value> {
+        struct Find<'k> {
+            table: &'k str,
+            key: &'k str,
+            found: Option<Value>,
+        }
+        impl Visitor for Find<'_> {
+            fn visit<T: Group>(&mut self, group: &T) {
+                if T::TABLE == self.table {
+                    self.found = T::row(self.key).map(|row| (row.get)(group));
+                }
+            }
+        }
+        let mut find = Find { table, key, found: None };
+        self.each(&mut find);
+        find.found
     }
 
     /// Scales the lattice with the wavelength, as in scene files: else speckle would lose its scatterers.

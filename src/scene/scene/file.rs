@@ -41,21 +41,17 @@ pub use error::SceneError;
 pub use known::{facts, paths, value, value_of_settings};
 pub use paper::paper;
 pub use placing::SCALES;
-pub use poses::named_pose;
 pub use probe::stated as stated_pose;
-pub use save::{Entry, Note, named_files, save, save_with};
+pub use save::{Note, named_files, save, save_with};
 pub use schema::reference;
 pub use setting::{Setting, setting};
 pub use settings::{load_settings, put_settings};
 pub use study::{Plan, Question, Scenario, Slice};
-pub use table::{Key, changes, differing, entries};
+pub use table::{Entry, Key, changes, differing, entries};
 pub use trajectory::load_trajectory;
 
-use crate::settings::Settings;
+use crate::settings::suggest;
 use schema::Title;
-
-/// Largest width of a picture, pixels: the limit of image files and messages.
-const WIDEST: f64 = 65535.0;
 
 /// A pair of `overrides` as [`Scene::load`] takes them, from `path=value`.
 ///
@@ -101,7 +97,7 @@ impl Scene {
     ) -> Result<(Self, Vec<Variant>, Vec<Warning>), SceneError> {
         let path = &source.path;
         let document = source.document()?;
-        let file = document.parse()?;
+        let file = schema::File::of(&document)?;
         let mut warnings = Vec::new();
 
         let mut tissues = tissues::Tissues::new(&document, &file.tissues)?;
@@ -109,14 +105,20 @@ impl Scene {
         let background =
             tissues.index("background", &file.background.clone().unwrap_or(background))?;
         let mut anatomy = anatomy::meshes(&document, &file.mesh, &mut tissues, &mut warnings)?;
-        let graph = graph::build(&document, &file, &mut anatomy)?;
+        let nodes = graph::Tables {
+            group: &file.group,
+            transform: &file.transform,
+            selector: &file.selector,
+            mesh: &file.mesh,
+        };
+        let graph = graph::build(&document, nodes, &mut anatomy)?;
         let instances = anatomy.origins(&file.mesh);
         let wires = anatomy::wires(&file.wire);
         let settings = settings::settings(&document, &file, None)?;
         let orientation = orientation(&document, file.orientation.as_deref())?;
         let world_from_probe = probe::pose(&document, "probe", &file.probe.stated)?;
         let poses = poses::build(&document, &file.pose)?;
-        presentable(&document, &settings)?;
+        settings::presentable(&document, &settings)?;
         warnings.extend(silent(&settings).into_iter().map(|found| {
             let at = document.fail(found.path, found.message, found.remedy);
             let warning = Warning::warning(&at.file, 1, at.message, at.remedy.unwrap_or_default());
@@ -174,7 +176,7 @@ impl Scene {
         anatomy::countable(&document, &scene.wires)?;
         scene.set_time(0.0);
         scene.tasks =
-            tasks::build(&document, &file, &scene.poses, &scene.meshes, &scene.instances)?;
+            tasks::build(&document, &file.task, &scene.poses, &scene.meshes, &scene.instances)?;
         warnings.extend(scene.coincidences(path));
         warnings.extend(scene.lines_in_gas(path));
         let variants = vary::variants(&document, &file.vary.stated, &scene, suggested)?;
@@ -185,9 +187,29 @@ impl Scene {
 /// The files of the volume that the scene file at `path` names, as they are written there; none where
 /// it names none or cannot be read.
 pub fn volume_of(path: &Path) -> Vec<PathBuf> {
-    let file = Source::read(path, &[]).and_then(|source| source.document()?.parse());
+    let file = Source::read(path, &[]).and_then(|source| schema::File::of(&source.document()?));
     let table = file.ok().and_then(|file| file.volume);
     table.map_or_else(Vec::new, |table| fusion::files(&table.stated))
+}
+
+/// The override, path and value, that puts the probe of the scene file at `path` to its pose `name`.
+///
+/// # Errors
+/// A file that cannot be read, or that has no such pose.
+pub fn named_pose(path: &Path, name: &str) -> Result<(String, String), SceneError> {
+    let source = Source::read(path, &[])?;
+    let document = source.document()?;
+    let poses = poses::build(&document, &schema::File::of(&document)?.pose)?;
+    let found = poses.iter().find(|pose| pose.name == name).ok_or_else(|| {
+        let remedy = match poses.is_empty() {
+            true => {
+                "add it as [[pose]]; the window does, in the console's section Poses".to_owned()
+            }
+            false => suggest::among(name, poses.iter().map(|pose| pose.name.as_str())),
+        };
+        SceneError::file(path, format!("there is no pose `{name}`"), &remedy)
+    })?;
+    Ok(probe::stated(found.world_from_probe).1)
 }
 
 /// How the patient lies, as the file says it.
@@ -202,22 +224,6 @@ fn orientation(
         Orientation::of(text).map_err(failed)
     });
     parsed.transpose()
-}
-
-/// Fails on a picture wider than can be written or sent.
-fn presentable(document: &Document<'_>, settings: &Settings) -> Result<(), SceneError> {
-    let height = settings.imaging.image_height;
-    let [left, top, right, bottom] = settings.probe.bounds();
-    let width = (right - left) / (bottom - top) * f64::from(height);
-    if width <= WIDEST {
-        return Ok(());
-    }
-    let message =
-        format!("a picture of this probe would be {width:.0} pixels wide and {height} high");
-    let remedy = format!(
-        "at most {WIDEST} fit: give a smaller image_height, a deeper image or a narrower probe"
-    );
-    Err(document.fail("imaging.image_height", message, remedy))
 }
 
 #[cfg(test)]

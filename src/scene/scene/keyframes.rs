@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Mesh, Scene};
+use super::mesh::Mesh;
 use crate::settings::words;
 use glam::DVec3;
 
@@ -54,7 +54,7 @@ pub struct Keyframes {
     /// Group of instances that change shape together: they have keyframes of the same times, and move the tissue
     /// between them. None: the instance alone.
     pub group: Option<usize>,
-    /// How many times a program has set the last one of them ([`Scene::reshape`]).
+    /// How many times a program has set the last one of them ([`Scene::reshape`](super::Scene::reshape)).
     pub revision: u64,
 }
 
@@ -70,60 +70,6 @@ impl Keyframes {
         // The first of equal ones.
         let found = self.blend.iter().rev().copied().max_by(heaviest);
         found.map_or(0, |(keyframe, _)| keyframe)
-    }
-}
-
-impl Scene {
-    /// Gives an instance another shape of its present topology. The first time it gets two keyframes, its shape at rest
-    /// and this one: tissue then moves with the surface. The world takes the shape at its next update.
-    ///
-    /// # Panics
-    /// Another topology; an instance with keyframes of its own.
-    pub fn reshape(&mut self, instance: usize, shape: Arc<Mesh>) {
-        let keyframes = &self.instances[instance].keyframes;
-        let [rest, live] = match keyframes.meshes[..] {
-            [] => [self.instances[instance].mesh, self.meshes.len()],
-            [rest, live] if keyframes.revision > 0 => [rest, live],
-            _ => panic!("`{}` has keyframes of its own", self.instances[instance].name),
-        };
-        assert!(shape.shares_topology(&self.meshes[rest]), "`{}` has other triangles", shape.name);
-        // A field that moves tissue is made for what differs from the shape at rest.
-        if live == self.meshes.len() {
-            if shape.positions == self.meshes[rest].positions {
-                return;
-            }
-            self.meshes.push(shape);
-        } else {
-            self.meshes[live] = shape;
-        }
-        let instance = &mut self.instances[instance];
-        instance.mesh = live;
-        instance.keyframes = Keyframes {
-            meshes: vec![rest, live],
-            strategy: Strategy::Refit,
-            blend: [(1, 1.0), (0, 0.0), (0, 0.0), (0, 0.0)],
-            group: None,
-            revision: instance.keyframes.revision + 1,
-        };
-    }
-
-    /// The present scene without keyframes, which every strategy has to match. Instances keep their numbers;
-    /// hidden ones have no triangles.
-    pub fn still(&self) -> Self {
-        let mut still = self.clone();
-        for instance in &mut still.instances {
-            let keyframes = std::mem::take(&mut instance.keyframes);
-            let between = keyframes.blend.iter().filter(|(_, weight)| *weight != 0.0);
-            if keyframes.strategy == Strategy::Interpolate && between.count() > 1 {
-                instance.mesh = still.meshes.len();
-                still.meshes.push(keyframes.blended(&self.meshes).into());
-            }
-            if !std::mem::replace(&mut instance.shown, true) {
-                instance.mesh = still.meshes.len();
-                still.meshes.push(Arc::default());
-            }
-        }
-        still
     }
 }
 

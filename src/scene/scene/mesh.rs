@@ -3,12 +3,13 @@
 use std::path::Path;
 
 use super::formats::{self, off, ply, stl, threemf, vtk, vtp};
-use super::{Mesh, check, load_gltf, load_obj};
-use crate::issue::{self, Issue};
+use super::{check, load_gltf, load_obj};
+use crate::issue::Issue;
 
 mod animated;
 mod keyframes;
 mod recipe;
+mod soup;
 mod surface;
 
 pub use animated::{
@@ -17,68 +18,11 @@ pub use animated::{
 pub(super) use keyframes::bounded;
 pub use keyframes::{MAX_SHAPES, load_keyframes};
 pub use recipe::weld;
+pub use soup::{MAX_ELEMENTS, MAX_FILE, Mesh, Options, Soup, Units};
+pub(super) use soup::{Parts, read_bounded};
 pub use surface::Surface;
 
 use recipe::Recipe;
-
-/// Largest file that is read, bytes. Four million triangles of text fit; memory stays under 1 GB.
-pub const MAX_FILE: u64 = 256 << 20;
-
-/// Most triangles and most vertices of one file.
-pub const MAX_ELEMENTS: usize = 4_000_000;
-
-/// Dihedral angle above which shading normals are split, degrees.
-const CREASE: f32 = 40.0;
-
-/// Triangles that share vertices by index. Units are those of the file until [`load`] scales.
-#[derive(Clone, Debug, Default)]
-pub struct Soup {
-    /// Object, group or node name; may be empty.
-    pub name: String,
-    /// Vertex positions.
-    pub positions: Vec<[f32; 3]>,
-    /// Vertex indices, counter-clockwise seen from outside. A reader guarantees that they are
-    /// in range.
-    pub triangles: Vec<[u32; 3]>,
-}
-
-/// Length of the file's unit.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Units(
-    /// Millimetres per unit of the file.
-    pub f64,
-);
-
-impl Units {
-    /// Names as scene files write them, with the length of each in mm.
-    pub const NAMES: [(&str, f64); 5] =
-        [("um", 1e-3), ("mm", 1.0), ("cm", 10.0), ("m", 1000.0), ("in", 25.4)];
-
-    /// The names alone.
-    pub const WORDS: [&str; 5] = {
-        let [um, mm, cm, m, inch] = Self::NAMES;
-        [um.0, mm.0, cm.0, m.0, inch.0]
-    };
-
-    /// The unit called `name`.
-    pub fn named(name: &str) -> Option<Self> {
-        let found = Self::NAMES.iter().find(|(n, _)| *n == name)?;
-        Some(Self(found.1))
-    }
-}
-
-/// Options for reading a mesh file.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Options {
-    /// Unit; without it the one that the format defines (glTF: metres) or the file states (3MF), else mm.
-    pub units: Option<Units>,
-    /// Only this glTF node with its children, this OBJ object or group, this STL solid or 3MF object.
-    pub node: Option<String>,
-    /// True where boundary loops are closed by fans to their centres.
-    pub cap_openings: bool,
-    /// Most shapes that are sampled from an animated skin, at least 2; without it 24.
-    pub keyframes: Option<usize>,
-}
 
 /// Result of reading a file, mm; with a mesh only if no finding is an error.
 #[derive(Clone, Debug, Default)]
@@ -93,17 +37,6 @@ pub struct Inspected {
     pub parts: Vec<String>,
     /// All findings.
     pub issues: Vec<Issue>,
-}
-
-/// Result of a reader.
-#[derive(Debug, Default)]
-pub(super) struct Parts {
-    pub parts: Vec<Soup>,
-    pub issues: Vec<Issue>,
-    /// The unit, where format or file say it.
-    pub units: Option<Units>,
-    /// True where the file states that its frame is RAS.
-    pub ras: bool,
 }
 
 /// Reads and checks a mesh file; positions end in mm.
@@ -267,12 +200,6 @@ impl Kind {
 /// Returns whether the extension is that of a readable mesh file.
 pub fn is_mesh(path: &Path) -> bool {
     Kind::of(path).is_some()
-}
-
-/// Reads a regular file of at most [`MAX_FILE`] bytes.
-pub(super) fn read_bounded(path: &Path) -> Result<Vec<u8>, Vec<Issue>> {
-    let smaller = "reduce the mesh or split the file";
-    issue::read(path, MAX_FILE, smaller).map_err(|error| vec![error.into()])
 }
 
 fn merge(parts: Vec<Soup>, units: Units) -> Soup {

@@ -61,11 +61,6 @@ fn numbers<T: Group>() -> impl Iterator<Item = Parameter> {
     })
 }
 
-/// The value of a group's setting.
-fn current<T: Group>(settings: &T, key: &str) -> Option<Value> {
-    T::row(key).map(|row| (row.get)(settings))
-}
-
 impl Parameter {
     /// All parameters.
     pub fn all() -> impl Iterator<Item = Self> {
@@ -123,18 +118,9 @@ impl Parameter {
         self.facts.unit()
     }
 
-    /// The value of its setting.
-    fn current(&self, settings: &Settings) -> Option<Value> {
-        match self.table {
-            Probe::TABLE => current(&settings.probe, self.facts.key),
-            Simulation::TABLE => current(&settings.simulation, self.facts.key),
-            _ => current(&settings.imaging, self.facts.key),
-        }
-    }
-
     /// Its value, in [`Self::unit`]; none where the probe does not have it.
     pub fn value(&self, settings: &Settings) -> Option<f64> {
-        match (self.current(settings)?, self.part) {
+        match (settings.value(self.table, self.facts.key)?, self.part) {
             (Value::Number(number), _) => Some(number),
             (Value::Whole(count), _) => Some(f64::from(count)),
             (Value::List(list), Some(part)) => list.get(part).copied(),
@@ -166,7 +152,7 @@ impl Parameter {
 
     /// The entry of the scene file, path and value, for `value` beside the other `settings`.
     pub fn setting(&self, settings: &Settings, value: f64) -> (String, String) {
-        let text = match (self.part, self.current(settings)) {
+        let text = match (self.part, settings.value(self.table, self.facts.key)) {
             (Some(part), Some(Value::List(mut list))) => {
                 list[part] = value;
                 let list: Vec<_> = list.iter().map(f64::to_string).collect();

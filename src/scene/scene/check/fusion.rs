@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
-use super::Facts;
+use super::mesh::Facts;
 use super::nodes::periods;
 use crate::scene::fusion::{Acquired, TEXTURE_BUDGET};
 use crate::scene::{Issue, Scene, file};

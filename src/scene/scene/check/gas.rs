@@ -4,7 +4,7 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::encloses;
+use super::enclosing::encloses;
 use crate::scene::{Issue, Scene};
 
 /// Impedance below which a medium is a gas, MRayl: a quarter of the lung's, 250 times that of air.

@@ -6,7 +6,9 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::{Facts, encloses, fusion, nodes};
+use super::enclosing::encloses;
+use super::mesh::{Facts, measure};
+use super::{fusion, nodes};
 use crate::scene::mesh::{self, Animated, AnimatedNode, Choice, Inspected, Options, Placement};
 use crate::scene::{Instance, Issue, Scene, SceneError, Severity};
 use crate::volume;
@@ -207,7 +209,7 @@ fn world_facts(scene: &Scene, instance: &Instance) -> (Facts, DVec3) {
         let outward = (b - a).cross(c - a).normalize_or_zero();
         (a + b + c) / 3.0 + outward * OUTSIDE
     });
-    (super::measure(&soup), outside)
+    (measure(&soup), outside)
 }
 
 /// Tissue at the point beside each instance, without that instance: of the enclosing mesh of highest priority, or the

@@ -5,14 +5,13 @@ use std::sync::Arc;
 
 use super::document::{Source, segments};
 use super::error::SceneError;
+use super::schema::File;
 use super::shelf::MeshKeys;
 use super::table::Table;
 use super::tissues::Tissues;
-use super::{anatomy, presentable, probe, settings};
+use super::{anatomy, probe, settings};
 use crate::scene::{Mesh, Origin, Scene, Warning};
-
-/// Tables whose entries [`SceneFile::put`] serves.
-const LIGHT: [&str; 4] = ["probe", "simulation", "imaging", "tissues"];
+use crate::settings::Settings;
 
 /// The text of a scene file.
 pub struct SceneFile {
@@ -66,7 +65,9 @@ impl SceneFile {
 
     /// True if a change of the entry at `path` needs no file that the scene names, so that [`Self::put`] makes it.
     pub fn is_light(path: &str) -> bool {
-        segments(path).first().is_some_and(|table| LIGHT.contains(&table.as_str()))
+        let is_light =
+            |table: &String| Settings::TABLES.contains(&table.as_str()) || table == "tissues";
+        segments(path).first().is_some_and(is_light)
     }
 
     /// Gives `scene`, which was loaded from this file, the settings, tissues and pose of the probe that the file gives
@@ -77,14 +78,14 @@ impl SceneFile {
     pub fn put(&self, entries: &[(String, String)], scene: &mut Scene) -> Result<(), SceneError> {
         let source = self.source.with(entries);
         let document = source.document()?;
-        let file = document.parse()?;
+        let file = File::of(&document)?;
         let mut tissues = Tissues::new(&document, &file.tissues)?;
         for tissue in &scene.tissues {
             tissues.index("tissues", &tissue.name)?;
         }
         let settings = settings::settings(&document, &file, None)?;
         let pose = probe::pose(&document, "probe", &file.probe.stated)?;
-        presentable(&document, &settings)?;
+        settings::presentable(&document, &settings)?;
         let mut surfaces = Vec::new();
         for (instance, Origin { mesh, .. }) in scene.instances.iter().zip(&scene.origins.instances)
         {
@@ -108,6 +109,6 @@ impl SceneFile {
     /// The fault of the entry.
     pub fn check(&self, entries: &[(String, String)]) -> Result<(), SceneError> {
         let source = self.source.with(entries);
-        source.document()?.parse().map(drop)
+        File::of(&source.document()?).map(drop)
     }
 }

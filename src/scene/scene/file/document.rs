@@ -12,8 +12,8 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::error::{SceneError, advice};
-use super::schema::File;
-use crate::scene::{Mesh, shipped};
+use crate::scene::mesh::Mesh;
+use crate::scene::shipped;
 use crate::settings::{Facts, Value};
 pub use paths::Misfit;
 pub use paths::quoted;
@@ -183,13 +183,6 @@ impl Source {
 }
 
 impl Document<'_> {
-    /// A scene file as the schema understands it, all values in their ranges.
-    pub fn parse(&self) -> Result<File, SceneError> {
-        let file: File = self.parse_as()?;
-        file.check(self)?;
-        Ok(file)
-    }
-
     /// The file as `T` understands it.
     pub fn parse_as<T: DeserializeOwned>(&self) -> Result<T, SceneError> {
         let root = Spanned::new(0..self.source.text.len(), self.root.clone());

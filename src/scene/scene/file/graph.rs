@@ -7,12 +7,12 @@ use glam::{DAffine3, DVec3};
 use super::anatomy::Anatomy;
 use super::document::Document;
 use super::error::SceneError;
-use super::motion::{self, PERIOD};
-use super::nodes::{Entry, Kind, depths, entries, parents};
+use super::motion::{self, MotionKeys, PERIOD};
+use super::nodes::{Entry, Kind, NodeKeys, depths, in_order, of_kind, parents};
 use super::placing::placed;
 use super::playing::Following;
-use super::schema::File;
-use super::table::Stated;
+use super::shelf::MeshKeys;
+use super::table::{Stated, Table};
 use crate::scene::animation::{Motion, Sequence};
 use crate::scene::graph::{Graph, Node, NodeKind};
 use crate::settings::group;
@@ -30,14 +30,27 @@ group! {
     }
 }
 
+/// The tables of a file that are nodes.
+#[derive(Clone, Copy)]
+pub(super) struct Tables<'f> {
+    pub group: &'f [Table<NodeKeys>],
+    pub transform: &'f [Table<MotionKeys>],
+    pub selector: &'f [Table<SelectorKeys>],
+    pub mesh: &'f [Table<MeshKeys>],
+}
+
 /// Makes the graph of all nodes; gives the instances with keyframes the number and the strategy of
 /// their selectors. Empty where no mesh has a parent and no node is written.
 pub(super) fn build(
     document: &Document<'_>,
-    file: &File,
+    file: Tables<'_>,
     anatomy: &mut Anatomy,
 ) -> Result<Graph, SceneError> {
-    let entries = entries(document, file)?;
+    let nodes = of_kind(file.group, |_| Kind::Group)
+        .chain(of_kind(file.transform, Kind::Transform))
+        .chain(of_kind(file.selector, Kind::Selector))
+        .chain(of_kind(file.mesh, Kind::Mesh));
+    let entries = in_order(document, nodes)?;
     let parents = parents(document, &entries)?;
     let depths = depths(document, &entries, &parents)?;
     let mut children = vec![Vec::new(); entries.len()];
@@ -112,7 +125,7 @@ fn switched(anatomy: &Anatomy, table: usize) -> Option<usize> {
 
 /// Numbers the selectors that stand for animations of mesh files: one for all meshes of one parent that
 /// change at the same times.
-fn group_played(file: &File, anatomy: &mut Anatomy) {
+fn group_played(file: Tables<'_>, anatomy: &mut Anatomy) {
     let mut groups: Vec<(Option<&str>, &Sequence)> = Vec::new();
     for (stated, placed) in file.mesh.iter().map(|table| &table.stated).zip(&anatomy.placed) {
         let played = placed.playing.iter().flat_map(|p| &p.meshes);
@@ -143,7 +156,7 @@ struct Choices {
 /// The file's nodes with their relations.
 struct Family<'a> {
     document: &'a Document<'a>,
-    file: &'a File,
+    file: Tables<'a>,
     entries: &'a [Entry<'a>],
     parents: &'a [Option<usize>],
     children: Vec<Vec<usize>>,

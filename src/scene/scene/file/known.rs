@@ -38,15 +38,10 @@ pub fn value(scene: &Scene, path: &str) -> Option<Value> {
     }
 }
 
-/// The value of a key in `settings`; none of keys of other tables than `probe`, `simulation` and `imaging`.
+/// The value of a key in `settings`; none of keys of other tables than theirs.
 pub fn value_of_settings(settings: &Settings, path: &str) -> Option<Value> {
     let (table, key) = path.split_once('.')?;
-    match table {
-        "probe" => of(&settings.probe, key),
-        "simulation" => of(&settings.simulation, key),
-        "imaging" => of(&settings.imaging, key),
-        _ => None,
-    }
+    settings.value(table, key)
 }
 
 fn of<T: Group>(settings: &T, key: &str) -> Option<Value> {

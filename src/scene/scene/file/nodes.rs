@@ -4,7 +4,6 @@ use std::collections::HashMap;
 
 use super::document::Document;
 use super::error::SceneError;
-use super::schema::File;
 use super::table::{Keys, Table};
 use crate::settings::{Form, group, suggest};
 
@@ -36,27 +35,25 @@ pub(super) enum Kind {
     Mesh(usize),
 }
 
+/// Tables that are nodes of one kind.
+pub(super) fn of_kind<'f, K: Keys>(
+    tables: &'f [Table<K>],
+    kind: fn(usize) -> Kind,
+) -> impl Iterator<Item = Entry<'f>> {
+    tables.iter().enumerate().map(move |(i, Table { stated, .. })| Entry {
+        path: format!("{}.{i}", K::TABLE),
+        name: stated.text("name").unwrap_or_default(),
+        parent: stated.text("parent"),
+        kind: kind(i),
+    })
+}
+
 /// All nodes in the order in which they stand in the file; their names are unique.
-pub(super) fn entries<'f>(
+pub(super) fn in_order<'f>(
     document: &Document<'_>,
-    file: &'f File,
+    nodes: impl Iterator<Item = Entry<'f>>,
 ) -> Result<Vec<Entry<'f>>, SceneError> {
-    fn all<'f, K: Keys>(
-        tables: &'f [Table<K>],
-        kind: fn(usize) -> Kind,
-    ) -> impl Iterator<Item = Entry<'f>> {
-        tables.iter().enumerate().map(move |(i, Table { stated, .. })| Entry {
-            path: format!("{}.{i}", K::TABLE),
-            name: stated.text("name").unwrap_or_default(),
-            parent: stated.text("parent"),
-            kind: kind(i),
-        })
-    }
-    let mut out: Vec<Entry<'f>> = all(&file.group, |_| Kind::Group)
-        .chain(all(&file.transform, Kind::Transform))
-        .chain(all(&file.selector, Kind::Selector))
-        .chain(all(&file.mesh, Kind::Mesh))
-        .collect();
+    let mut out: Vec<Entry<'f>> = nodes.collect();
     out.sort_by_key(|e| document.place(&e.path));
     let mut names = HashMap::new();
     for (e, entry) in out.iter().enumerate() {

@@ -1,13 +1,11 @@
 //! The tables `pose`: named poses of the probe.
 
-use std::path::Path;
-
-use super::document::{Document, Source};
+use super::document::Document;
 use super::error::SceneError;
-use super::probe::{self, Pose, look};
+use super::probe::{Pose, look};
 use super::table::Table;
 use crate::scene::NamedPose;
-use crate::settings::{Form, group, suggest};
+use crate::settings::{Form, group};
 
 group! {
     /// The name of a pose.
@@ -45,24 +43,4 @@ pub(super) fn build(
         poses.push(NamedPose { name, world_from_probe });
     }
     Ok(poses)
-}
-
-/// The override, path and value, that puts the probe of the scene file at `path` to its pose `name`.
-///
-/// # Errors
-/// A file that cannot be read, or that has no such pose.
-pub fn named_pose(path: &Path, name: &str) -> Result<(String, String), SceneError> {
-    let source = Source::read(path, &[])?;
-    let document = source.document()?;
-    let poses = build(&document, &document.parse()?.pose)?;
-    let found = poses.iter().find(|pose| pose.name == name).ok_or_else(|| {
-        let remedy = match poses.is_empty() {
-            true => {
-                "add it as [[pose]]; the window does, in the console's section Poses".to_owned()
-            }
-            false => suggest::among(name, poses.iter().map(|pose| pose.name.as_str())),
-        };
-        SceneError::file(path, format!("there is no pose `{name}`"), &remedy)
-    })?;
-    Ok(probe::stated(found.world_from_probe).1)
 }

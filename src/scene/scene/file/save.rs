@@ -9,15 +9,12 @@ use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, KeyMut, Table, Ta
 use super::document::{Misfit, Source, element, segments};
 use super::error::SceneError;
 use super::placing::placed;
+use super::schema::File;
+use super::table::Entry;
 use super::tissues::Tissues;
 use super::{poses, probe, settings, tasks};
 use crate::output::files;
 use crate::scene::shipped;
-
-/// A setting to be written: its path, as [`crate::scene::Scene::load`] takes it, and its value, or none if
-/// the key is to be removed. Names with dots are quoted, as in TOML: `mesh."a.b".roughness`. A `pose` is added under a
-/// name that the file does not have, and removed as a whole.
-pub type Entry = (String, Option<String>);
 
 /// The list of named poses, which alone grows and shrinks.
 const POSES: &str = "pose";
@@ -101,7 +98,7 @@ pub fn save_with(
 /// Fails if the result could not be read again; nothing is written then.
 fn check(source: &Source) -> Result<(), SceneError> {
     let document = source.document()?;
-    let file = document.parse()?;
+    let file = File::of(&document)?;
     settings::settings(&document, &file, None)?;
     probe::pose(&document, "probe", &file.probe.stated)?;
     let poses = poses::build(&document, &file.pose)?;

@@ -40,50 +40,63 @@ group! {
     }
 }
 
-/// The whole file. Absent keys have their defaults.
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct File {
-    pub name: Option<String>,
-    pub background: Option<String>,
-    pub orientation: Option<String>,
-    #[serde(default)]
-    pub probe: Table<Probe>,
-    #[serde(default)]
-    pub simulation: Table<Simulation>,
-    #[serde(default)]
-    pub pose: Vec<Table<PoseKeys>>,
-    #[serde(default)]
-    pub task: Vec<Table<TaskKeys>>,
-    #[serde(default)]
-    pub imaging: Table<Imaging>,
-    #[serde(default)]
-    pub model: Table<Size>,
-    pub volume: Option<Table<Display>>,
-    pub fusion: Option<Table<Fusion>>,
-    pub contact: Option<Table<ContactKeys>>,
-    #[serde(default)]
-    pub tracker: Table<TrackerKeys>,
-    #[serde(default)]
-    pub live: Table<Live>,
-    #[serde(default, alias = "sweep")]
-    pub vary: Table<VaryKeys>,
-    #[serde(default)]
-    pub group: Vec<Table<NodeKeys>>,
-    #[serde(default)]
-    pub transform: Vec<Table<MotionKeys>>,
-    #[serde(default)]
-    pub selector: Vec<Table<SelectorKeys>>,
-    #[serde(default)]
-    pub mesh: Vec<Table<MeshKeys>>,
-    #[serde(default)]
-    pub wire: Vec<Table<WireKeys>>,
-    #[serde(default)]
-    pub tissues: BTreeMap<String, Table<Tissue>>,
+/// A table that every file has, with defaults where it is not written.
+type One<K> = Table<K>;
+/// A table that may be missing.
+type Maybe<K> = Option<Table<K>>;
+/// A list of tables.
+type Many<K> = Vec<Table<K>>;
+/// Tables by name.
+type Named<K> = BTreeMap<String, Table<K>>;
+
+/// Values that have to lie in the ranges of their keys.
+trait Checked {
+    /// Fails at the first value out of its range; `table` is written as in the reference.
+    fn check(&self, document: &Document<'_>, table: &str) -> Result<(), SceneError>;
+}
+
+impl<K: Keys> Checked for One<K> {
+    fn check(&self, document: &Document<'_>, table: &str) -> Result<(), SceneError> {
+        Table::check(self, document, table)
+    }
+}
+
+impl<K: Keys> Checked for Maybe<K> {
+    fn check(&self, document: &Document<'_>, table: &str) -> Result<(), SceneError> {
+        self.as_ref().map_or(Ok(()), |own| own.check(document, table))
+    }
+}
+
+impl<K: Keys> Checked for Many<K> {
+    fn check(&self, document: &Document<'_>, table: &str) -> Result<(), SceneError> {
+        let mut numbered = (0..).zip(self);
+        numbered.try_for_each(|(i, own)| own.check(document, &format!("{table}.{i}")))
+    }
+}
+
+impl<K: Keys> Checked for Named<K> {
+    fn check(&self, document: &Document<'_>, table: &str) -> Result<(), SceneError> {
+        let table = table.trim_end_matches("NAME");
+        self.iter()
+            .try_for_each(|(name, own)| own.check(document, &format!("{table}{}", quoted(name))))
+    }
 }
 
 macro_rules! tables {
-    ($($of:ty, $table:literal: $($keys:expr),+;)+) => {
+    ($($field:ident: $shape:ident<$of:ty>, $table:literal: $($keys:expr),+;)+) => {
+        /// The whole file. Absent keys have their defaults.
+        #[derive(Debug, Deserialize)]
+        #[serde(deny_unknown_fields)]
+        pub struct File {
+            pub name: Option<String>,
+            pub background: Option<String>,
+            pub orientation: Option<String>,
+            /// Values of parameters, for variants of the scene. Its keys are those of other tables.
+            #[serde(default, alias = "sweep")]
+            pub vary: Table<VaryKeys>,
+            $(#[serde(default)] pub $field: $shape<$of>,)+
+        }
+
         $(impl Keys for $of {
             const TABLE: &'static str = $table;
 
@@ -94,71 +107,63 @@ macro_rules! tables {
 
         /// All tables, as the reference writes them, with their keys.
         pub fn reference() -> Vec<(&'static str, Vec<Key>)> {
-            vec![$(($table, <$of>::keys())),+]
+            vec![(Title::TABLE, Title::keys()), $(($table, <$of>::keys())),+]
+        }
+
+        impl File {
+            /// Fails at the first value out of its range.
+            fn check(&self, document: &Document<'_>) -> Result<(), SceneError> {
+                $(Checked::check(&self.$field, document, $table)?;)+
+                Ok(())
+            }
         }
     };
 }
 
+impl Keys for Title {
+    const TABLE: &'static str = "";
+
+    fn keys() -> Vec<Key> {
+        defaults::<Title>("").collect()
+    }
+}
+
+// A table is a row: its shape in the file, its name, and the groups of its keys.
 tables! {
-    Title, "": defaults::<Title>("");
-    Probe, "probe": defaults::<PresetKey>(""), keys::<Probe>("", "preset"), defaults::<Pose>("pose.");
-    PoseKeys, "pose": defaults::<PoseKeys>(""), defaults::<Pose>("");
-    TaskKeys, "task": defaults::<TaskKeys>(""), defaults::<Pose>("");
-    MeshKeys, "mesh": defaults::<NodeKeys>(""), defaults::<MeshKeys>(""), defaults::<Cycle>(""),
+    probe: One<Probe>, "probe": defaults::<PresetKey>(""), keys::<Probe>("", "preset"), defaults::<Pose>("pose.");
+    pose: Many<PoseKeys>, "pose": defaults::<PoseKeys>(""), defaults::<Pose>("");
+    task: Many<TaskKeys>, "task": defaults::<TaskKeys>(""), defaults::<Pose>("");
+    mesh: Many<MeshKeys>, "mesh": defaults::<NodeKeys>(""), defaults::<MeshKeys>(""), defaults::<Cycle>(""),
         defaults::<Updates>(""), defaults::<Following>(""), defaults::<Stretch>(""), defaults::<Placed>(""),
         defaults::<Affine>(""), keys::<Surface>("", ""), keys::<Surface>("inside.", "as outside"), defaults::<ShapeKeys>("shape.");
-    NodeKeys, "group": defaults::<NodeKeys>("");
-    MotionKeys, "transform": defaults::<NodeKeys>(""), defaults::<Stretch>(""), defaults::<Placed>(""),
+    group: Many<NodeKeys>, "group": defaults::<NodeKeys>("");
+    transform: Many<MotionKeys>, "transform": defaults::<NodeKeys>(""), defaults::<Stretch>(""), defaults::<Placed>(""),
         defaults::<Affine>(""), defaults::<MotionKeys>("motion."), defaults::<Cycle>("motion."), defaults::<Updates>("motion.");
-    SelectorKeys, "selector": defaults::<NodeKeys>(""), defaults::<SelectorKeys>(""), defaults::<Cycle>(""),
+    selector: Many<SelectorKeys>, "selector": defaults::<NodeKeys>(""), defaults::<SelectorKeys>(""), defaults::<Cycle>(""),
         defaults::<Updates>(""), defaults::<Following>("");
-    WireKeys, "wire": defaults::<WireKeys>("");
-    Tissue, "tissues.NAME": defaults::<TissueKeys>(""), keys::<Tissue>("", "");
-    Simulation, "simulation": defaults::<Simulation>("");
-    Imaging, "imaging": defaults::<Imaging>("");
-    Size, "model": defaults::<Size>(""), defaults::<Placed>("");
-    Display, "volume": defaults::<VolumeKeys>(""), defaults::<Cycle>(""), defaults::<Size>(""),
+    wire: Many<WireKeys>, "wire": defaults::<WireKeys>("");
+    tissues: Named<Tissue>, "tissues.NAME": defaults::<TissueKeys>(""), keys::<Tissue>("", "");
+    simulation: One<Simulation>, "simulation": defaults::<Simulation>("");
+    imaging: One<Imaging>, "imaging": defaults::<Imaging>("");
+    model: One<Size>, "model": defaults::<Size>(""), defaults::<Placed>("");
+    volume: Maybe<Display>, "volume": defaults::<VolumeKeys>(""), defaults::<Cycle>(""), defaults::<Size>(""),
         defaults::<Placed>(""), keys::<Display>("", "");
-    Fusion, "fusion": defaults::<MaskKeys>(""), defaults::<Fusion>("");
-    ContactKeys, "contact": defaults::<ContactKeys>("");
-    TrackerKeys, "tracker": defaults::<TrackerKeys>(""),
+    fusion: Maybe<Fusion>, "fusion": defaults::<MaskKeys>(""), defaults::<Fusion>("");
+    contact: Maybe<ContactKeys>, "contact": defaults::<ContactKeys>("");
+    tracker: One<TrackerKeys>, "tracker": defaults::<TrackerKeys>(""),
         defaults::<Placed>("world_from_reference."), defaults::<MatrixKey>("world_from_reference."),
         defaults::<Placed>("tool_from_probe."), defaults::<MatrixKey>("tool_from_probe.");
-    Live, "live": defaults::<Live>("");
+    live: One<Live>, "live": defaults::<Live>("");
 }
 
 impl File {
-    /// Fails at the first value out of its range.
-    pub fn check(&self, document: &Document<'_>) -> Result<(), SceneError> {
-        fn one<'t, K: Keys>(
-            document: &Document<'_>,
-            table: impl Into<Option<&'t Table<K>>>,
-        ) -> Result<(), SceneError> {
-            table.into().map_or(Ok(()), |table| table.check(document, K::TABLE))
-        }
-        fn all<K: Keys>(document: &Document<'_>, tables: &[Table<K>]) -> Result<(), SceneError> {
-            let mut numbered = (0..).zip(tables);
-            numbered.try_for_each(|(i, table)| table.check(document, &format!("{}.{i}", K::TABLE)))
-        }
-        one(document, &self.probe)?;
-        one(document, &self.simulation)?;
-        one(document, &self.imaging)?;
-        one(document, &self.model)?;
-        one(document, self.volume.as_ref())?;
-        one(document, self.fusion.as_ref())?;
-        one(document, self.contact.as_ref())?;
-        one(document, &self.tracker)?;
-        one(document, &self.live)?;
-        all(document, &self.pose)?;
-        all(document, &self.task)?;
-        all(document, &self.group)?;
-        all(document, &self.transform)?;
-        all(document, &self.selector)?;
-        all(document, &self.mesh)?;
-        all(document, &self.wire)?;
-        let mut tissues = self.tissues.iter();
-        tissues.try_for_each(|(name, table)| {
-            table.check(document, &format!("tissues.{}", quoted(name)))
-        })
+    /// The whole file, all values in their ranges.
+    ///
+    /// # Errors
+    /// The first value that does not fit.
+    pub fn of(document: &Document<'_>) -> Result<Self, SceneError> {
+        let file: Self = document.parse_as()?;
+        file.check(document)?;
+        Ok(file)
     }
 }

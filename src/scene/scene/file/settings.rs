@@ -4,10 +4,13 @@ use std::path::Path;
 
 use super::document::{Document, Source, segments};
 use super::error::SceneError;
+use super::probe;
 use super::schema::File;
-use super::table::entries;
-use super::{presentable, probe};
-use crate::settings::{Group, Imaging, Probe, Settings, Simulation};
+use super::table::{Entry, entries};
+use crate::settings::{Group, Imaging, Settings, Simulation, Visitor};
+
+/// Largest width of a picture, pixels: the limit of image files and messages.
+const WIDEST: f64 = 65535.0;
 
 /// The settings stated in the tables `probe`, `simulation` and `imaging` of `file`; what it leaves out is as the
 /// examination that it names has it. Defaults of `simulation` that
@@ -37,7 +40,7 @@ pub(super) fn settings(
 pub fn load_settings(path: &Path, settings: &mut Settings) -> Result<(), SceneError> {
     let source = Source::read(path, &[])?;
     let document = source.document()?;
-    let file = document.parse()?;
+    let file = File::of(&document)?;
     let has_probe = document.says_of("probe", "pose");
     let frequency = settings.probe.frequency;
     let found = self::settings(&document, &file, (!has_probe).then_some(frequency))?;
@@ -63,16 +66,26 @@ pub fn load_settings(path: &Path, settings: &mut Settings) -> Result<(), SceneEr
     Ok(())
 }
 
+/// All settings as entries.
+struct Entries(Vec<Entry>);
+
+impl Visitor for Entries {
+    fn visit<T: Group>(&mut self, group: &T) {
+        self.0.extend(entries(group, T::TABLE));
+    }
+}
+
 /// Gives `settings` the values of these entries, as `--set` takes them: of keys in `probe`, `simulation` and `imaging`.
 ///
 /// # Errors
 /// The first entry that does not fit; `settings` are then unchanged.
 pub fn put_settings(pairs: &[(String, String)], settings: &mut Settings) -> Result<(), SceneError> {
     let place = Path::new("command");
-    let tables = [Probe::TABLE, Simulation::TABLE, Imaging::TABLE];
     for (path, _) in pairs {
         let parts = segments(path);
-        if !tables.contains(&parts[0].as_str()) || parts.get(1).is_some_and(|key| key == "pose") {
+        if !Settings::TABLES.contains(&parts[0].as_str())
+            || parts.get(1).is_some_and(|key| key == "pose")
+        {
             return Err(SceneError::file(
                 place,
                 format!("`{path}` is no setting of a running window"),
@@ -82,23 +95,20 @@ pub fn put_settings(pairs: &[(String, String)], settings: &mut Settings) -> Resu
     }
     // As a file says it: before its division for scatterers that do not fit into the cells.
     let cell = settings.simulation.cell * settings.simulation.crowding();
-    let own = Simulation { cell, ..settings.simulation.clone() };
-    let own = [
-        entries(&settings.probe, Probe::TABLE),
-        entries(&own, Simulation::TABLE),
-        entries(&settings.imaging, Imaging::TABLE),
-    ];
+    let simulation = Simulation { cell, ..settings.simulation.clone() };
+    let mut own = Entries(Vec::new());
+    Settings { simulation, ..settings.clone() }.each(&mut own);
     let sets = |path: &str| pairs.iter().any(|(set, _)| set == path);
     let is_kept = |path: &str| {
         // Those of a preset are the preset's.
         !(sets(path) || sets("probe.preset") && path.starts_with("probe."))
     };
-    let own = own.concat().into_iter().filter(|(path, _)| is_kept(path));
+    let own = own.0.into_iter().filter(|(path, _)| is_kept(path));
     let own = own.filter_map(|(path, value)| Some((path, value?)));
     let all: Vec<_> = own.chain(pairs.iter().cloned()).collect();
     let source = Source::of(place, String::new()).with(&all);
     let document = source.document()?;
-    let mut found = self::settings(&document, &document.parse()?, None)?;
+    let mut found = self::settings(&document, &File::of(&document)?, None)?;
     if !sets("simulation.cell") {
         let frequency = std::mem::replace(&mut settings.probe.frequency, found.probe.frequency);
         let mut followed = settings.clone();
@@ -113,6 +123,22 @@ pub fn put_settings(pairs: &[(String, String)], settings: &mut Settings) -> Resu
     presentable(&document, &found)?;
     *settings = found;
     Ok(())
+}
+
+/// Fails on a picture wider than can be written or sent.
+pub(super) fn presentable(document: &Document<'_>, settings: &Settings) -> Result<(), SceneError> {
+    let height = settings.imaging.image_height;
+    let [left, top, right, bottom] = settings.probe.bounds();
+    let width = (right - left) / (bottom - top) * f64::from(height);
+    if width <= WIDEST {
+        return Ok(());
+    }
+    let message =
+        format!("a picture of this probe would be {width:.0} pixels wide and {height} high");
+    let remedy = format!(
+        "at most {WIDEST} fit: give a smaller image_height, a deeper image or a narrower probe"
+    );
+    Err(document.fail("imaging.image_height", message, remedy))
 }
 
 #[cfg(test)]

@@ -9,8 +9,12 @@ use serde::de::{DeserializeSeed, Deserializer, Error, MapAccess, Visitor};
 
 use super::document::Document;
 use super::error::SceneError;
-use super::save::Entry;
 use crate::settings::{Facts, Form, Group, Row, Value};
+
+/// A setting to be written: its path, as [`crate::scene::Scene::load`] takes it, and its value, or none if
+/// the key is to be removed. Names with dots are quoted, as in TOML: `mesh."a.b".roughness`. A `pose` is added under a
+/// name that the file does not have, and removed as a whole.
+pub type Entry = (String, Option<String>);
 
 /// Contents of a table of scene files.
 pub trait Keys: 'static {

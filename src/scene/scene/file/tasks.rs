@@ -6,7 +6,6 @@ use super::document::Document;
 use super::error::SceneError;
 use super::fusion::closed_mesh;
 use super::probe::{Pose, look};
-use super::schema::File;
 use super::table::Table;
 use crate::scene::task::{
     Cover, Goal, Measurement, Question, Target, Task, Unit, longest_axis, volume,
@@ -129,13 +128,13 @@ impl Place<'_> {
 /// The tasks of a file, in its order.
 pub(super) fn build(
     document: &Document<'_>,
-    file: &File,
+    tables: &[Table<TaskKeys>],
     poses: &[NamedPose],
     meshes: &[Arc<Mesh>],
     instances: &[Instance],
 ) -> Result<Vec<Task>, SceneError> {
     let mut tasks: Vec<Task> = Vec::new();
-    for (index, table) in file.task.iter().enumerate() {
+    for (index, table) in tables.iter().enumerate() {
         let place = Place { document, index, table };
         let keys: TaskKeys = table.stated.get("");
         for (key, text, remedy) in [

@@ -2,6 +2,7 @@
 
 use super::document::Document;
 use super::error::SceneError;
+use super::schema::File;
 use super::settings;
 use super::table::{Key, Keys, Stated};
 use crate::scene::Scene;
@@ -74,7 +75,7 @@ fn settled(
 ) -> Result<Variant, SceneError> {
     let source = document.source.with(std::slice::from_ref(&setting));
     let document = source.document()?;
-    let file = document.parse()?;
+    let file = File::of(&document)?;
     let settings = settings::settings(&document, &file, None)?;
     Ok(Variant { parameter, value, setting, settings })
 }

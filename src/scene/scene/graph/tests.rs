@@ -5,7 +5,7 @@ use glam::{DAffine3, DQuat, DVec3};
 use super::*;
 use crate::probe::Probe;
 use crate::scene::animation::{Clock, Interpolation, Turn};
-use crate::scene::{Keyframes, Mesh, Surface, Tissue};
+use crate::scene::{Keyframes, Mesh, Scene, Surface, Tissue};
 
 fn instance(keyframes: &[usize]) -> Instance {
     Instance {

@@ -3,20 +3,13 @@
 use std::path::Path;
 
 use super::recipe::Recipe;
-use super::{Inspected, Options, Soup, Units, load, read_raw};
+use super::soup::{Mesh, Options, Soup, Units};
+use super::{Inspected, load, read_raw};
 use crate::issue::Issue;
-use crate::scene::{Mesh, check};
+use crate::scene::check;
 
 /// Most vertices and triangles of all shapes of a surface together. Some 0.5 GB during reading.
 pub const MAX_SHAPES: usize = 16_000_000;
-
-impl Mesh {
-    /// Returns whether `self` and `other` can be shapes of one surface: equal triangles and equally many vertices,
-    /// so that the same vertex is the same point of the tissue.
-    pub fn shares_topology(&self, other: &Self) -> bool {
-        self.positions.len() == other.positions.len() && self.triangles == other.triangles
-    }
-}
 
 /// Reads files that are the shapes of one surface over time, in order; positions end in mm.
 ///

@@ -3,10 +3,13 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use super::{CREASE, Soup};
+use super::soup::{Mesh, Soup};
 use crate::issue::Issue;
 use crate::scene::normals::{self, Split};
-use crate::scene::{Mesh, topology};
+use crate::scene::topology;
+
+/// Dihedral angle above which shading normals are split, degrees.
+const CREASE: f32 = 40.0;
 
 /// The vertices of a file's surface after repair, each with the file's vertices that it comes from.
 pub struct Recipe {
