@@ -10,7 +10,7 @@ use insonify::settings::{Loss, Words};
 use insonify::sim::dump;
 use insonify::sim::fusion::Tint;
 use insonify::sim::shaders::Library;
-use insonify::sim::{Simulator, Tracer};
+use insonify::sim::{Outputs, Shot, Simulator, Tracer};
 use insonify::volume::Voxels;
 
 use crate::common::shared_data::shared_data;
@@ -621,8 +621,8 @@ fn the_tint_marks_the_acquired_pixels_and_leaves_the_image_alone() {
         let (dim, format) = (ImageDim::D2, ImageFormat::Rgba8Unorm);
         let extent = [plain.0, plain.1, 1];
         let image = Image::new(&device, "tinted", dim, extent, format).unwrap();
-        simulator.tint_on(Some((image.clone(), tint)));
-        simulator.frame(&scene, 0).unwrap();
+        let outputs = Outputs { tinted: Some((&image, tint)), ..Outputs::default() };
+        simulator.frames_into(&scene, &[Shot::of(&scene, 0)], &outputs).unwrap();
         assert!(simulator.pixels().unwrap() == plain, "{settings}");
         let tinted = simulator.tinted_pixels().unwrap().expect("asked for");
         assert!(image.read_back().unwrap() == tinted);
@@ -652,7 +652,6 @@ fn the_tint_marks_the_acquired_pixels_and_leaves_the_image_alone() {
         // A hard mask is mixed only where its border passes between two samples.
         assert_eq!(mixed > 2000, !is_hard, "{settings}: {mixed}");
         // Another frame without it is again the same.
-        simulator.tint_on(None);
         simulator.frame(&scene, 0).unwrap();
         assert!(simulator.pixels().unwrap() == plain);
     }

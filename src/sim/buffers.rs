@@ -5,9 +5,7 @@ use std::ops::Index;
 use std::sync::Arc;
 
 use super::pass::{Array, Sizes};
-use super::stages;
 use crate::gpu::{Buffer, BufferKind, Commands, Device, GpuError};
-use crate::scene::Scene;
 
 /// Tables that all images of a frame share.
 const SHARED: [&str; 6] = ["scanlines", "rows", "surfaces", "points", "grey", "speckle"];
@@ -20,19 +18,27 @@ pub(super) struct Buffers {
 }
 
 impl Buffers {
-    /// The buffers that frames of `scene` need, for sizes up to `room`.
-    pub(super) fn new(device: &Arc<Device>, scene: &Scene, room: Sizes) -> Result<Self, GpuError> {
+    /// Buffers of `arrays`, for sizes up to `room`.
+    pub(super) fn new(
+        device: &Arc<Device>,
+        arrays: impl Iterator<Item = &'static Array>,
+        room: Sizes,
+    ) -> Result<Self, GpuError> {
         let mut buffers = Self { made: BTreeMap::new(), room };
-        buffers.add(device, stages::needed(scene))?;
+        buffers.add(device, arrays)?;
         Ok(buffers)
     }
 
-    /// The same buffers once more, but for the tables, which are shared.
-    pub(super) fn beside(&self, device: &Arc<Device>, scene: &Scene) -> Result<Self, GpuError> {
+    /// Buffers of `arrays` once more, but for the tables, which are shared.
+    pub(super) fn beside(
+        &self,
+        device: &Arc<Device>,
+        arrays: impl Iterator<Item = &'static Array>,
+    ) -> Result<Self, GpuError> {
         let shared = SHARED.iter().filter_map(|name| self.made.get_key_value(name));
         let made = shared.map(|(name, (array, buffer))| (*name, (*array, buffer.clone())));
         let mut buffers = Self { made: made.collect(), room: self.room };
-        buffers.add(device, stages::needed(scene))?;
+        buffers.add(device, arrays)?;
         Ok(buffers)
     }
 

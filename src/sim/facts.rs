@@ -3,7 +3,7 @@
 use glam::DAffine3;
 use serde_json::{Map, Value, json};
 
-use crate::settings::{Group, Settings};
+use crate::settings::{Group, Settings, Visitor};
 
 /// Place of a picture in the image plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,29 +41,40 @@ pub fn pose(world_from_probe: &DAffine3) -> Value {
 
 /// Settings of a frame by the keys of scene files, `units` of those that have one, and the counts that follow from
 /// them.
-pub fn settings(Settings { probe, simulation, imaging }: &Settings) -> Value {
+pub fn settings(settings: &Settings) -> Value {
+    let Settings { probe, simulation, .. } = settings;
     let lines = probe.scanlines * probe.elevation_layers;
-    let mut units = Map::new();
-    let tables =
-        [table(probe, &mut units), table(simulation, &mut units), table(imaging, &mut units)];
-    let [probe_keys, simulation_keys, imaging_keys] = tables;
-    json!({
-        "counts": {
-            "lines": lines,
-            "samples": probe.samples,
-            "paths_per_line": simulation.paths,
-            "paths": u64::from(lines) * u64::from(simulation.paths),
-            "cell_mm": simulation.cell,
-            "scatterer_cells_per_mm3": simulation.cell.powi(-3),
-            "scatterers_per_resolution_cell": simulation.scatterers_per_resolution_cell,
-            "volume_floor_db": simulation.volume_floor,
-            "branch_floor_db": simulation.branch_floor,
-        },
-        "probe": probe_keys,
-        "simulation": simulation_keys,
-        "imaging": imaging_keys,
-        "units": units,
-    })
+    let counts = json!({
+        "lines": lines,
+        "samples": probe.samples,
+        "paths_per_line": simulation.paths,
+        "paths": u64::from(lines) * u64::from(simulation.paths),
+        "cell_mm": simulation.cell,
+        "scatterer_cells_per_mm3": simulation.cell.powi(-3),
+        "scatterers_per_resolution_cell": simulation.scatterers_per_resolution_cell,
+        "volume_floor_db": simulation.volume_floor,
+        "branch_floor_db": simulation.branch_floor,
+    });
+    let mut tables = Tables::default();
+    settings.each(&mut tables);
+    let mut out = Map::new();
+    out.insert("counts".into(), counts);
+    out.extend(tables.tables);
+    out.insert("units".into(), tables.units.into());
+    out.into()
+}
+
+/// The tables of all groups, and the units of their keys.
+#[derive(Default)]
+struct Tables {
+    tables: Map<String, Value>,
+    units: Map<String, Value>,
+}
+
+impl Visitor for Tables {
+    fn visit<T: Group>(&mut self, group: &T) {
+        self.tables.insert(T::TABLE.into(), table(group, &mut self.units));
+    }
 }
 
 /// The table of a group, with tables for keys that have dots; adds the units of its keys.

@@ -4,16 +4,17 @@
 use std::sync::Arc;
 
 use super::buffers::Buffers;
-use super::stages::pyramid::{Pyramid, is_banded};
 use super::{layout, placement};
 use crate::gpu::{Commands, Device, GpuError, Image};
 use crate::scene::{Acquired, Fusion, Scene};
 use crate::settings::{Blend, MaskSpeed};
+pub(super) use pyramid::{Pyramid, is_banded};
 use texture::VolumeTexture;
 
 pub use super::stages::tint::Tint;
 pub use steps::FusionSteps;
 
+mod pyramid;
 mod steps;
 mod texture;
 

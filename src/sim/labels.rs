@@ -204,11 +204,11 @@ impl Simulator {
     /// # Errors
     /// A Vulkan error.
     pub fn labels(&mut self) -> Result<Option<Labels>, SimError> {
-        if !self.labelled {
+        if !self.last.labelled {
             return Ok(None);
         }
         let frame = *self.constants();
-        let levelled = self.levelled;
+        let levelled = self.last.levelled;
         let mut grid = |name, rows: u32, columns: u32| {
             let labels = bytemuck::pod_collect_to_vec(&self.read_again(name)?);
             let shape = [rows, columns].map(|n| n as usize);

@@ -9,11 +9,10 @@ use glam::DAffine3;
 
 use super::buffers::Buffers;
 use super::contact::SkinContact;
-use super::fusion::FusionResources;
+use super::fusion::{FusionResources, Pyramid};
 use super::layout::{self, Frame};
-use super::pass::Sizes;
+use super::pass::{Array, Sizes};
 use super::read_out::ReadOut;
-use super::stages::pyramid::Pyramid;
 use super::tables::{Tables, tissue_seed};
 use super::{SimError, Simulator, machine, placement};
 use crate::gpu::{Buffer, Commands, Device, GpuError};
@@ -69,15 +68,16 @@ pub(super) struct Lane {
 }
 
 impl Lane {
-    /// The first lane, for images of up to these sizes.
+    /// The first lane, with buffers of `arrays`, for images of up to these sizes.
     pub(super) fn new(
         device: &Arc<Device>,
         scene: &Scene,
+        arrays: impl Iterator<Item = &'static Array>,
         sizes: Sizes,
         volume_of: Option<&FusionResources>,
     ) -> Result<Self, GpuError> {
         Ok(Self {
-            buffers: Buffers::new(device, scene, sizes)?,
+            buffers: Buffers::new(device, arrays, sizes)?,
             fusion: FusionResources::new(device, scene, volume_of)?,
             frame: sizes.frame,
             read_out: ReadOut::default(),
@@ -86,9 +86,14 @@ impl Lane {
     }
 
     /// Another lane, which shares tables and volume with this one.
-    pub(super) fn beside(&self, device: &Arc<Device>, scene: &Scene) -> Result<Self, GpuError> {
+    pub(super) fn beside(
+        &self,
+        device: &Arc<Device>,
+        scene: &Scene,
+        arrays: impl Iterator<Item = &'static Array>,
+    ) -> Result<Self, GpuError> {
         Ok(Self {
-            buffers: self.buffers.beside(device, scene)?,
+            buffers: self.buffers.beside(device, arrays)?,
             fusion: FusionResources::new(device, scene, self.fusion.as_ref())?,
             frame: self.frame,
             read_out: ReadOut::default(),
@@ -155,19 +160,19 @@ impl Simulator {
     /// If the last frame had no such image.
     pub fn choose(&mut self, shot: usize) {
         assert!(shot < self.passes.active, "image {shot} of {}", self.passes.active);
-        self.chosen = shot;
+        self.last.chosen = shot;
     }
 
     /// The lane whose results are read.
     pub(super) fn lane(&self) -> &Lane {
-        &self.passes.lanes[self.chosen]
+        &self.passes.lanes[self.last.chosen]
     }
 
     /// The content of buffer `name` of the chosen lane after the last frame. It is copied within the next frame if it
     /// was read after this one, so that reading it then takes no submission of its own.
     pub(super) fn read_again(&mut self, name: &'static str) -> Result<Vec<u8>, SimError> {
         let sizes = self.sizes();
-        let lane = &mut self.passes.lanes[self.chosen];
+        let lane = &mut self.passes.lanes[self.last.chosen];
         let mut bytes = vec![0; lane.buffers.bytes(name, &sizes)];
         match lane.read_out.take(name) {
             Some(copy) => self.submissions.read(copy, &mut bytes)?,

@@ -26,6 +26,7 @@ pub mod bvh;
 pub mod calibration;
 pub mod contact;
 pub mod dump;
+mod echoes;
 mod expected;
 pub mod facts;
 pub mod fields;
@@ -37,6 +38,7 @@ mod line;
 pub mod lobe;
 pub mod memory;
 pub mod pass;
+mod pass_kernels;
 mod passes;
 pub mod placement;
 mod read_out;
@@ -51,6 +53,8 @@ pub mod special;
 pub mod stages;
 pub mod tables;
 pub mod tracer;
+pub mod trial;
+mod upload;
 pub mod view3d;
 pub mod world;
 
@@ -73,13 +77,15 @@ use lane::Lane;
 pub use lane::Shot;
 use line::OneLine;
 pub use memory::Memory;
-use passes::{PassKernels, Passes, frame_constants};
+use pass_kernels::PassKernels;
+use passes::Passes;
 pub use resize::image_size;
 use shaders::Library;
 use sources::{Sources, TableCache};
 use stages::{AXIAL, BEAM, CHART, DISPLAY, LABEL, LEVEL, SCATTER};
 use tables::Tables;
 pub use tracer::Tracer;
+use upload::frame_constants;
 use view3d::Viewer3d;
 use world::World;
 
@@ -102,6 +108,35 @@ pub fn machine(device: &Device) -> Machine {
     }
 }
 
+/// Images that a frame fills, beside the buffers that it leaves: each of the frame's size, [`image_size`].
+#[derive(Clone, Copy, Default)]
+pub struct Outputs<'a> {
+    /// The B-mode image.
+    pub shown: Option<&'a Image>,
+    /// The same with its acquired pixels coloured. Frames that show no acquired volume leave it unchanged.
+    pub tinted: Option<(&'a Image, Tint)>,
+    /// The same with the tissues that are seen in their colours, with an opacity of 0 to 1. Frames without labels leave
+    /// it unchanged.
+    pub painted: Option<(&'a Image, f32)>,
+}
+
+/// What the last frame has.
+#[derive(Clone, Copy, Default)]
+struct Last {
+    /// It was mixed with an acquired volume.
+    fused: bool,
+    /// It has labels.
+    labelled: bool,
+    /// These have levels.
+    levelled: bool,
+    /// Its acquired pixels were coloured.
+    tinted: bool,
+    /// Its tissues were.
+    painted: bool,
+    /// Which of its images is read.
+    chosen: usize,
+}
+
 /// A scene on the device, ready to be imaged frame by frame.
 pub struct Simulator {
     device: Arc<Device>,
@@ -112,20 +147,9 @@ pub struct Simulator {
     tables: Tables,
     table_cache: TableCache,
     counting: bool,
-    /// True if the last frame was mixed with an acquired volume.
-    fused: bool,
-    /// True if the labels of the last frame have levels.
-    levelled: bool,
-    /// True if the last frame has labels.
-    labelled: bool,
-    /// The image into which the next frames are copied.
-    shown_on: Option<Image>,
+    last: Last,
     /// The kernel and buffers of the 3D view; made when it is first asked for.
     viewer3d: Option<Viewer3d>,
-    tinted_on: Option<(Image, Tint)>,
-    painted_on: Option<(Image, f32)>,
-    /// The image of the last frame whose results are read.
-    chosen: usize,
     update_time: Duration,
 }
 
@@ -161,7 +185,8 @@ impl Simulator {
         let tables = Tables::new(scene);
         let constants = tables.frame(scene);
         let (frame, batches) = frame_constants(constants, &world, coincident, &budget, None);
-        let lane = Lane::new(device, scene, batches.sizes(&frame, &tables), None)?;
+        let lane =
+            Lane::new(device, scene, stages::needed(scene), batches.sizes(&frame, &tables), None)?;
         let simulator = Self {
             device: Arc::clone(device),
             submissions: Frames::new(device, "frame")?,
@@ -170,17 +195,18 @@ impl Simulator {
             tables,
             table_cache: TableCache::default(),
             counting: false,
-            fused: false,
-            labelled: false,
-            levelled: false,
-            shown_on: None,
+            last: Last::default(),
             viewer3d: None,
-            tinted_on: None,
-            painted_on: None,
-            chosen: 0,
             update_time: Duration::ZERO,
             passes: Passes {
-                kernels: PassKernels::new(device, library, scene, &world, false)?,
+                kernels: PassKernels::new(
+                    device,
+                    library,
+                    scene,
+                    stages::of(scene),
+                    &world,
+                    false,
+                )?,
                 lanes: vec![lane],
                 active: 1,
                 skins: contact::Skins::default(),
@@ -224,7 +250,23 @@ impl Simulator {
     /// # Panics
     /// Without shots.
     pub fn frames(&mut self, scene: &Scene, shots: &[Shot]) -> Result<Vec<FrameTimings>, SimError> {
-        self.make(scene, shots, None)
+        self.frames_into(scene, shots, &Outputs::default())
+    }
+
+    /// Like [`Self::frames`]; fills images with the first of them, too.
+    ///
+    /// # Errors
+    /// Those of [`Self::frames`].
+    ///
+    /// # Panics
+    /// Without shots.
+    pub fn frames_into(
+        &mut self,
+        scene: &Scene,
+        shots: &[Shot],
+        outputs: &Outputs<'_>,
+    ) -> Result<Vec<FrameTimings>, SimError> {
+        self.make(scene, shots, None, outputs)
     }
 
     /// Makes images, or one line of them each.
@@ -233,6 +275,7 @@ impl Simulator {
         scene: &Scene,
         shots: &[Shot],
         line: Option<OneLine>,
+        outputs: &Outputs<'_>,
     ) -> Result<Vec<FrameTimings>, SimError> {
         assert!(!shots.is_empty(), "a frame without images");
         let exchanged = self.adopt(scene)?;
@@ -254,7 +297,8 @@ impl Simulator {
         if fusion.is_none() {
             passes.run(&mut cmd, &DISPLAY)?;
         }
-        (self.labelled, self.levelled, self.chosen) = (labelled, levelled, 0);
+        let fused = fusion.is_some();
+        self.last = Last { labelled, levelled, ..Last::default() };
         if labelled {
             passes.run(&mut cmd, &LABEL)?;
             if levelled {
@@ -266,17 +310,19 @@ impl Simulator {
         if let Some(fusion) = fusion {
             passes.fuse(&mut cmd, fusion)?;
         }
-        self.fused = fusion.is_some();
-        if let Some(image) = &self.shown_on {
-            cmd.copy_to_image(passes.lanes[0].pixels(self.fused), image)?;
+        self.last.fused = fused;
+        if let Some(image) = outputs.shown {
+            cmd.copy_to_image(passes.lanes[0].pixels(fused), image)?;
         }
-        if let (Some((image, tint)), true) = (&self.tinted_on, self.fused) {
-            let tinted = passes.tint(&mut cmd, tint)?;
+        if let (Some((image, tint)), true) = (outputs.tinted, fused) {
+            let tinted = passes.tint(&mut cmd, &tint)?;
             cmd.copy_to_image(tinted, image)?;
+            self.last.tinted = true;
         }
-        if let (Some((image, opacity)), true) = (&self.painted_on, labelled) {
-            let painted = passes.paint(&mut cmd, scene, *opacity, self.fused)?;
+        if let (Some((image, opacity)), true) = (outputs.painted, labelled) {
+            let painted = passes.paint(&mut cmd, scene, opacity, fused)?;
             cmd.copy_to_image(painted, image)?;
+            self.last.painted = true;
         }
         passes.read_out(&mut cmd, &sizes)?;
         cmd.submit()?;
@@ -308,7 +354,7 @@ impl Simulator {
             self.table_cache.put(before, left);
             // The others are made again when they are needed, with what the frame needs now.
             self.passes.lanes.truncate(1);
-            (self.passes.active, self.chosen) = (1, 0);
+            (self.passes.active, self.last.chosen) = (1, 0);
             self.passes.lanes[0].buffers.add(&self.device, stages::needed(scene))?;
             self.upload_tables()?;
         }
@@ -401,7 +447,7 @@ impl Simulator {
     /// A Vulkan error.
     pub fn pixels(&mut self) -> Result<(u32, u32, Vec<u8>), SimError> {
         let (width, height) = (self.constants().image_width, self.constants().image_height);
-        Ok((width, height, self.read_again(lane::pixels(self.fused))?))
+        Ok((width, height, self.read_again(lane::pixels(self.last.fused))?))
     }
 
     /// A warning for the user about how the scene was uploaded, if there is one.

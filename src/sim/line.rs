@@ -6,7 +6,7 @@
 use super::lane::{Shot, pixels};
 use super::layout::{self, LATERAL_REACH};
 use super::tables::Tables;
-use super::{SimError, Simulator};
+use super::{Outputs, SimError, Simulator};
 use crate::scene::Scene;
 
 /// A scanline that is made alone.
@@ -97,7 +97,7 @@ impl Simulator {
         let smoothed = smoothed(&self.tables);
         let reach = smoothed + aperture_reach(scene, &self.tables);
         let line = OneLine { number, rows, reach, smoothed };
-        self.make(scene, &[Shot::of(scene, index)], Some(line))?;
+        self.make(scene, &[Shot::of(scene, index)], Some(line), &Outputs::default())?;
         let rgba = self.read_again(pixels(false))?;
         Ok(rgba.chunks_exact(4).map(|pixel| pixel[0]).collect())
     }

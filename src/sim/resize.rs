@@ -1,10 +1,10 @@
-//! Frames larger than the simulator was made for, and the image in which they are shown.
+//! Frames larger than the simulator was made for.
 
 use super::batches::FrameBudget;
 use super::lane::Lane;
-use super::passes::frame_constants;
-use super::{SimError, Simulator, Sources, Tables};
-use crate::gpu::Image;
+use super::stages;
+use super::upload::frame_constants;
+use super::{Last, SimError, Simulator, Sources, Tables};
 use crate::scene::Scene;
 
 impl Simulator {
@@ -26,23 +26,16 @@ impl Simulator {
         }
         self.submissions.wait()?;
         let volume_of = self.passes.lanes[0].fusion.as_ref();
-        let lane = Lane::new(&self.device, scene, sizes, volume_of)?;
+        let lane = Lane::new(&self.device, scene, stages::needed(scene), sizes, volume_of)?;
         let passes = &mut self.passes;
         (passes.lanes, passes.active, passes.batches) = (vec![lane], 1, batches);
         passes.shown = frame;
-        self.chosen = 0;
         self.tables = tables;
         self.sources = Sources::of(scene);
         // The new buffers hold no frame yet.
-        (self.fused, self.labelled) = (false, false);
+        self.last = Last::default();
         self.upload_tables()?;
         Ok(true)
-    }
-
-    /// Copies the next frames into an image of their size, [`image_size`] texels of RGBA; with none they stay in
-    /// their buffer.
-    pub fn show_on(&mut self, image: Option<Image>) {
-        self.shown_on = image;
     }
 }
 

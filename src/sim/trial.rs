@@ -1,4 +1,5 @@
-//! A trial of a device's ray query: on a scene's own rays it must find what our own hierarchy finds.
+//! The choice of a tracer, and the trial of a device's ray query: on a scene's own rays it must find what our own
+//! hierarchy finds.
 //!
 //! Drivers and hardware differ, and nothing later would detect a mistake: a surface found twice puts the
 //! path into the wrong tissue up to its end.
@@ -7,14 +8,14 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::Tracer;
 use crate::SimError;
 use crate::bvh::Splits;
 use crate::fields::Fields;
-use crate::gpu::{Binding, BufferKind, Device, GpuError, Kernel};
+use crate::gpu::{AdapterKind, Binding, BufferKind, Device, GpuError, Kernel};
 use crate::layout::{NONE, Ray, RayHit};
 use crate::scene::Scene;
 use crate::shaders::Library;
+use crate::tracer::Tracer;
 use crate::world::{ShapeKernels, World};
 
 /// Rays followed at the same time: one per line, if there are as many lines.
@@ -27,6 +28,58 @@ const ORDER_MARGIN: f32 = 1e-3;
 const MOST_DIFFERENT: usize = 3;
 /// Distance from a surface at which the next ray begins, relative to the largest coordinate (glsl/path.glsl).
 const CLEARANCE: f32 = 4e-6;
+
+impl Tracer {
+    /// Chooses the tracer. If `wanted` names none, it is the device's ray query if the hardware has one, else the
+    /// compute tracer, which is two to three times as fast as a ray query that a driver emulates on the
+    /// processor (benches/RESULTS.md). A ray query is first tried on the scene's own rays; if the device keeps
+    /// results from one start to the next, only once per geometry. Returns the tracer, and a line that says why
+    /// the ray query is not used where that needs saying.
+    pub fn choose(
+        wanted: Option<Self>,
+        device: &Arc<Device>,
+        library: &Library,
+        scene: &Scene,
+    ) -> (Self, Option<String>) {
+        match wanted {
+            Some(tracer) => (tracer, None),
+            None if device.info().kind == AdapterKind::Cpu => (Self::Bvh, None),
+            None if device.supports_ray_query() => match tried(device, library, scene) {
+                Ok(()) => (Self::RayQuery, None),
+                Err(why) => {
+                    let name = device.name();
+                    let why =
+                        format!("tracing with the compute BVH: the ray query of '{name}' {why}");
+                    (Self::Bvh, Some(why))
+                }
+            },
+            None => {
+                let why =
+                    format!("tracing with the compute BVH: '{}' has no ray queries", device.name());
+                (Self::Bvh, Some(why))
+            }
+        }
+    }
+}
+
+/// Checks that the device's ray query finds what it should; the error completes "the ray query ...".
+fn tried(device: &Arc<Device>, library: &Library, scene: &Scene) -> Result<(), String> {
+    let id = id(library, scene);
+    if device.remembers(id) {
+        return Ok(());
+    }
+    match Trial::run(device, library, scene) {
+        Ok(trial) if trial.passed() => {
+            device.remember(id);
+            Ok(())
+        }
+        Ok(trial) => Err(format!(
+            "meets other surfaces on {} of {} rays; --tracer ray-query takes it all the same",
+            trial.different, trial.rays
+        )),
+        Err(error) => Err(format!("cannot be tried: {error}")),
+    }
+}
 
 /// The result of a trial.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -68,7 +121,7 @@ impl Trial {
 }
 
 /// A number that is equal for equal kernels and geometry; their trial need not be repeated.
-pub(super) fn id(library: &Library, scene: &Scene) -> u64 {
+fn id(library: &Library, scene: &Scene) -> u64 {
     let crc = crc::Crc::<u64>::new(&crc::CRC_64_XZ);
     let mut digest = crc.digest();
     for stem in ["rays_bvh", "rays_query", "trace_query"] {

@@ -163,7 +163,7 @@ impl Simulator {
         let viewer3d = self.viewer3d.insert(viewer3d);
         let mut cmd = self.submissions.begin()?;
         cmd.scope("view3d");
-        viewer3d.record(&mut cmd, sight, passes, self.fused)?;
+        viewer3d.record(&mut cmd, sight, passes, self.last.fused)?;
         cmd.copy_to_image(&viewer3d.picture, image)?;
         cmd.submit()?;
         self.submissions.wait()?;

@@ -5,8 +5,9 @@ use std::time::Instant;
 
 use egui::{CursorIcon, Id, Pos2, Rect, Sense, Shape, Stroke, Ui, pos2, vec2};
 
-use super::bmode::{self, Place};
+use super::bmode;
 use super::model::Model;
+use super::place::Place;
 use super::style;
 use crate::settings::{Facts, Group, Imaging};
 

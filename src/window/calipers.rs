@@ -9,10 +9,10 @@ use egui::{
 };
 use glam::DVec2;
 
-use super::bmode::Place;
-use super::engine::Frame;
 use super::model::calipers::{Caliper, Kind, Reading};
 use super::model::sheet::{Mark, Sheet, Tool, What};
+use super::picture::Frame;
+use super::place::Place;
 use super::{keys, notes, style};
 use crate::settings::Exam;
 use insonify_lab::exam;

@@ -13,7 +13,7 @@ use serde_json::{Map, Value};
 
 use self::files::Claim;
 use super::deaths::CAPTURE;
-use super::engine::Frame;
+use super::picture::Frame;
 use crate::exchange;
 use crate::gpu::{GpuError, Screenshot};
 use crate::output::dicom::{self, About, DicomError, Study};

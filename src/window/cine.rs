@@ -5,8 +5,8 @@ use std::time::Instant;
 use egui::{Align, CornerRadius, Layout, Rect, Response, Sense, Shape, Stroke, Ui, pos2, vec2};
 
 use super::captures::Format;
-use super::engine::Frame;
 use super::model::{Cine, Model};
+use super::picture::Frame;
 use super::style::{self, button};
 use super::tools::Tools;
 

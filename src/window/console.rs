@@ -12,69 +12,126 @@ mod probe;
 mod registration;
 mod simulation;
 
-pub(super) use poses::Naming;
-
 use std::time::Instant;
 
-use egui::{Align, CollapsingHeader, RichText, ScrollArea, Ui};
+use egui::{Align, CollapsingHeader, Key, RichText, ScrollArea, Ui};
 
 use super::files;
 use super::model::{Model, Source};
 use super::naming::Wanted;
-use super::state::State;
+use super::panel::{Desk, Dock, OpenPanels, Panel, Row};
 use crate::style::{self, button};
+use poses::Naming;
 
-/// Width of the console, points.
-pub(super) const WIDTH: f32 = 336.0;
+/// Its row in the list of panels.
+pub(super) const ROW: Row = Row {
+    name: "Console",
+    tip: "Settings",
+    key: Some((Key::C, "C")),
+    dock: Dock::Right(336.0),
+    has_button: true,
+};
 
-/// Draws the console into a side panel.
-pub(super) fn show(ui: &mut Ui, model: &mut Model, state: &mut State, now: Instant) {
-    actions(ui, model, now);
-    files::row(ui, model, &mut state.files);
-    if !state.warnings.is_empty() {
-        let text = format!("{} warnings", state.warnings.len());
-        let tip = "What is suspicious about the scene, as `insonify check` says it";
-        let text = RichText::new(text).small().color(style::WARN);
-        ui.toggle_value(&mut state.warned, text).on_hover_text(tip);
+/// The console.
+#[derive(Default)]
+pub(super) struct Console {
+    /// Names of poses that are being typed.
+    poses: Naming,
+    /// Tissue under inspection: index into the scene's.
+    tissue: usize,
+    /// Mesh under inspection: index into the scene's instances.
+    mesh: usize,
+    /// The section that is to be opened.
+    wanted: Option<Wanted>,
+}
+
+impl Console {
+    /// Opens the section of a tissue or of a surface.
+    pub(super) fn want(&mut self, wanted: Wanted, open: &mut OpenPanels) {
+        match wanted {
+            Wanted::Tissue(tissue) => self.tissue = tissue,
+            Wanted::Surface(mesh) => self.mesh = mesh,
+        }
+        self.wanted = Some(wanted);
+        open.set(&ROW, true);
     }
-    ui.separator();
-    let before = model.settings.clone();
-    ScrollArea::vertical().auto_shrink([false; 2]).show(ui, |ui| {
-        section(ui, "Probe", true, |ui| probe::show(ui, &mut model.settings, &mut state.exam.open));
-        section(ui, "Image", true, |ui| image::show(ui, &mut model.settings));
-        section(ui, "Poses", false, |ui| poses::show(ui, model, &mut state.poses, now));
-        let mut animate = |ui: &mut Ui| animation::show(ui, model, now);
-        section(ui, "Animation", false, &mut animate);
-        section(ui, "Probe input", false, |ui| {
-            input::show(ui, model, state, now);
+
+    /// Another scene, or the same one read again, has other tissues and meshes.
+    pub(super) fn forget_indices(&mut self) {
+        (self.tissue, self.mesh) = (0, 0);
+    }
+}
+
+impl Panel for Console {
+    fn row(&self) -> &'static Row {
+        &ROW
+    }
+
+    fn show(&mut self, ui: &mut Ui, desk: &mut Desk<'_>) {
+        let now = desk.seen.now;
+        actions(ui, desk.model, now);
+        files::row(ui, desk.model, &mut desk.common.files);
+        if !desk.common.warnings.is_empty() {
+            let text = format!("{} warnings", desk.common.warnings.len());
+            let tip = "What is suspicious about the scene, as `insonify check` says it";
+            let text = RichText::new(text).small().color(style::WARN);
+            ui.toggle_value(&mut desk.common.warned, text).on_hover_text(tip);
+        }
+        ui.separator();
+        let before = desk.model.settings.clone();
+        ScrollArea::vertical().auto_shrink([false; 2]).show(ui, |ui| self.sections(ui, desk));
+        desk.model.note(&before, now);
+    }
+
+    fn leave(&mut self) {
+        self.poses = Naming::default();
+    }
+}
+
+impl Console {
+    fn sections(&mut self, ui: &mut Ui, desk: &mut Desk<'_>) {
+        let now = desk.seen.now;
+        section(ui, "Probe", true, |ui| {
+            probe::show(ui, &mut desk.model.settings, &mut desk.common.open);
         });
-        let (settings, lattice) = (&mut model.settings, model.file.lattice);
-        section(ui, "Simulation", false, |ui| simulation::show(ui, settings, state, lattice));
+        section(ui, "Image", true, |ui| image::show(ui, &mut desk.model.settings));
+        section(ui, "Poses", false, |ui| poses::show(ui, desk.model, &mut self.poses, now));
+        section(ui, "Animation", false, |ui| animation::show(ui, desk.model, now));
+        section(ui, "Probe input", false, |ui| input::show(ui, desk));
+        let (settings, lattice) = (&mut desk.model.settings, desk.model.file.lattice);
+        section(ui, "Simulation", false, |ui| {
+            simulation::show(ui, settings, &desk.common.device, lattice);
+        });
         if settings.fusion.is_some() {
-            section(ui, "Fusion", false, |ui| fusion::show(ui, model, now));
+            section(ui, "Fusion", false, |ui| fusion::show(ui, desk.model, now));
         }
-        if model.registration.is_some() {
-            let planes = &mut state.planes.open;
-            section(ui, "Registration", false, |ui| registration::show(ui, model, planes));
+        if desk.model.registration.is_some() {
+            section(ui, "Registration", false, |ui| {
+                registration::show(ui, desk.model, &mut desk.common.open);
+            });
         }
+        self.anatomy(ui, desk.model, now);
+    }
+
+    fn anatomy(&mut self, ui: &mut Ui, model: &mut Model, now: Instant) {
         let (settings, loaded) = (&mut model.settings, &model.loaded);
         let mut layer = model.layer;
-        let wanted = state.wanted.take();
-        let opens = |is: Wanted| (wanted == Some(is)).then_some(true);
-        opened(ui, "Tissues", opens(Wanted::Tissue), |ui| {
+        let wanted = self.wanted.take();
+        let tissue = matches!(wanted, Some(Wanted::Tissue(_))).then_some(true);
+        let surface = matches!(wanted, Some(Wanted::Surface(_))).then_some(true);
+        opened(ui, "Tissues", tissue, |ui| {
             anatomy::layer(ui, &mut layer);
-            anatomy::tissues(ui, settings, loaded, &mut state.tissue);
+            anatomy::tissues(ui, settings, loaded, &mut self.tissue);
         });
         let meshes = &model.meshes;
-        opened(ui, "Surfaces", opens(Wanted::Surface), |ui| {
-            anatomy::surfaces(ui, settings, loaded, meshes, &mut state.mesh);
+        opened(ui, "Surfaces", surface, |ui| {
+            anatomy::surfaces(ui, settings, loaded, meshes, &mut self.mesh);
         });
         if layer != model.layer {
             model.layer = layer;
             model.touch(now);
         }
-    });
-    model.note(&before, now);
+    }
 }
 
 fn section(ui: &mut Ui, name: &str, open: bool, add: impl FnOnce(&mut Ui)) {

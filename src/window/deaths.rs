@@ -4,12 +4,13 @@ use std::panic::PanicHookInfo;
 use std::sync::Arc;
 use std::thread;
 
-use egui::{Label, RichText, ScrollArea, Ui};
 use parking_lot::Mutex;
 
 use super::model::Model;
-use super::state::State;
-use super::style;
+
+mod notice;
+
+pub(super) use notice::show;
 
 /// Name of the simulation's thread.
 pub(super) const SIMULATION: &str = "simulation";
@@ -22,11 +23,6 @@ pub(super) const PADS: &str = "game pads";
 
 /// Most deaths that are kept: later ones rarely tell anything new.
 const KEPT: usize = 4;
-
-/// Width of the text, points: the smallest window has room for it.
-const WIDTH: f32 = 460.0;
-/// Height of the list, points.
-const HEIGHT: f32 = 220.0;
 
 /// A thread that died by a bug.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -118,44 +114,6 @@ fn last_words(info: &PanicHookInfo) -> String {
     match info.location() {
         Some(place) => format!("{place}: {said}"),
         None => said.to_owned(),
-    }
-}
-
-/// Shows which threads have died until the user has taken note.
-pub(super) fn show(ctx: &egui::Context, model: &mut Model, state: &mut State) {
-    let deaths = state.deaths.0.lock().clone();
-    if deaths.is_empty() {
-        return;
-    }
-    style::window("The program has a bug", 64.0).show(ctx, |ui| {
-        ui.set_width(WIDTH);
-        ui.horizontal(|ui| buttons(ui, model, state));
-        ui.label(
-            "Please report it: the copied text names version, device, scene and what was said.",
-        );
-        ScrollArea::vertical().max_height(HEIGHT).show(ui, |ui| {
-            for death in &deaths {
-                let text = format!("The thread '{}' died: {}", death.thread, death.said);
-                ui.add(Label::new(RichText::new(text).color(style::WARN)).wrap());
-                ui.label(death.remedy(state.stopped));
-            }
-        });
-    });
-}
-
-fn buttons(ui: &mut Ui, model: &mut Model, state: &mut State) {
-    if state.stopped && ui.button("Start again").clicked() {
-        state.restart = true;
-    }
-    if ui.button("Save settings").clicked() {
-        state.files.save(model);
-    }
-    if ui.button("Copy report").clicked() {
-        ui.ctx().copy_text(state.deaths.report(&state.device, model));
-    }
-    // While the simulation stands still the message stays on the screen.
-    if !state.stopped && ui.button("Close").clicked() {
-        state.deaths.0.lock().clear();
     }
 }
 

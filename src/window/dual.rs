@@ -4,13 +4,14 @@ use std::time::Instant;
 
 use egui::{Rect, Ui, pos2, vec2};
 
-use super::bmode::{self, Place};
+use super::bmode;
 use super::calipers;
-use super::engine::Frame;
 use super::framing::Framing;
 use super::model::Model;
 use super::model::sheet::Mark;
-use super::state::State;
+use super::picture::Frame;
+use super::place::Place;
+use super::tools::Tools;
 
 /// An image that is held, with the marks that are on it.
 struct Held {
@@ -97,9 +98,9 @@ impl Dual {
 }
 
 /// Holds the image that is shown beside the one that goes on, live.
-pub(super) fn hold(model: &mut Model, state: &mut State, now: Instant) {
-    let Some(frame) = state.tools.cine.shown() else { return };
-    state.dual.hold(frame, model.sheet.marks());
+pub(super) fn hold(model: &mut Model, dual: &mut Dual, tools: &Tools, now: Instant) {
+    let Some(frame) = tools.cine.shown() else { return };
+    dual.hold(frame, model.sheet.marks());
     // The marks are on the held image now.
     model.sheet.retire();
     if model.frozen {

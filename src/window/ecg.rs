@@ -2,8 +2,8 @@
 
 use egui::{Align2, Color32, FontId, Pos2, Shape, Stroke, Ui, pos2};
 
-use super::bmode::Place;
-use super::engine::Frame;
+use super::picture::Frame;
+use super::place::Place;
 use crate::scene::animation::Clock;
 use insonify_lab::exam::ecg::ecg;
 

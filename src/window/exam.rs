@@ -1,18 +1,27 @@
 //! The worksheet of the examination, and its report.
 
 use dicom_core::chrono::Local;
-use egui::{Grid, RichText, ScrollArea, TextEdit, Ui};
+use egui::{Grid, Key, RichText, ScrollArea, TextEdit, Ui};
 
 use super::model::Model;
 use super::model::sheet::What;
-use super::state::State;
+use super::panel::{Desk, Dock, Panel, Row};
 use super::style::{self, button};
 use crate::output::dicom::{Patient, Study};
 use crate::settings::{Exam, Words as _};
 use insonify_lab::exam::{Line, Measured, Report, Worksheet};
 
 /// Width of the worksheet, points.
-pub(super) const WIDTH: f32 = 300.0;
+const WIDTH: f32 = 300.0;
+
+/// Its row in the list of panels. Its button is beside the examination's name.
+pub(super) const ROW: Row = Row {
+    name: "Worksheet",
+    tip: "Named measurements, what follows from them, and the report",
+    key: Some((Key::X, "X")),
+    dock: Dock::Left(WIDTH),
+    has_button: false,
+};
 
 /// What reports and DICOM files say of the examination, with the form in which DICOM has it; typed.
 const FIELDS: [(&str, &str); 5] = [
@@ -26,8 +35,6 @@ const FIELDS: [(&str, &str); 5] = [
 /// The state of the worksheet: it is not saved with the scene.
 #[derive(Default)]
 pub(super) struct Examination {
-    /// True while the worksheet is open.
-    pub(super) open: bool,
     fields: [String; FIELDS.len()],
     findings: String,
     /// The study of the patient that was last typed.
@@ -61,46 +68,53 @@ pub(super) fn worksheet(model: &Model) -> Worksheet {
     Worksheet::of(model.settings.imaging.exam, &measured.collect::<Vec<_>>())
 }
 
-/// Draws the worksheet into a side panel.
-pub(super) fn show(ui: &mut Ui, model: &mut Model, state: &mut State) {
-    let sheet = worksheet(model);
-    ui.add_space(6.0);
-    ui.horizontal(|ui| {
-        let tip = "One HTML file beside the stills; the browser prints it or makes a PDF of it";
-        let ready = !state.tools.is_saving();
-        if ui.add_enabled_ui(ready, |ui| button(ui, "Save report", tip)).inner {
-            let report = report(model, &state.exam, sheet.clone());
-            state.tools.report(model, report);
-        }
-        let tip = "Remove all named measurements, on the image and off it; Undo brings them back";
-        let filled = !sheet.lines.is_empty();
-        if ui.add_enabled_ui(filled, |ui| button(ui, "Clear", tip)).inner {
-            model.sheet.strike_all();
-        }
-    });
-    ui.horizontal(|ui| {
-        ui.label(RichText::new(format!("Worksheet: {}", model.settings.imaging.exam)).strong());
-    });
-    ScrollArea::vertical().auto_shrink([false; 2]).show(ui, |ui| {
-        if let Some(place) = values(ui, &sheet) {
-            model.sheet.strike(place);
-        }
-        ui.separator();
-        let exam = &mut state.exam;
-        Grid::new("exam").num_columns(2).show(ui, |ui| {
-            for ((name, form), text) in FIELDS.iter().zip(&mut exam.fields) {
-                ui.label(*name);
-                let field = TextEdit::singleline(text).hint_text(*form);
-                ui.add(field.desired_width(200.0).char_limit(200));
-                ui.end_row();
+impl Panel for Examination {
+    fn row(&self) -> &'static Row {
+        &ROW
+    }
+
+    fn show(&mut self, ui: &mut Ui, desk: &mut Desk<'_>) {
+        let Desk { model, common, .. } = desk;
+        let tools = &mut common.tools;
+        let sheet = worksheet(model);
+        ui.add_space(6.0);
+        ui.horizontal(|ui| {
+            let tip = "One HTML file beside the stills; the browser prints it or makes a PDF of it";
+            let ready = !tools.is_saving();
+            if ui.add_enabled_ui(ready, |ui| button(ui, "Save report", tip)).inner {
+                let report = report(model, self, sheet.clone());
+                tools.report(model, report);
+            }
+            let tip =
+                "Remove all named measurements, on the image and off it; Undo brings them back";
+            let filled = !sheet.lines.is_empty();
+            if ui.add_enabled_ui(filled, |ui| button(ui, "Clear", tip)).inner {
+                model.sheet.strike_all();
             }
         });
-        ui.label("Findings");
-        let field = TextEdit::multiline(&mut exam.findings).desired_rows(3).char_limit(20_000);
-        ui.add(field.desired_width(WIDTH - 20.0));
-        let stills = state.tools.stills().count();
-        ui.small(format!("{stills} saved stills go into the report (F2 saves one)."));
-    });
+        ui.horizontal(|ui| {
+            ui.label(RichText::new(format!("Worksheet: {}", model.settings.imaging.exam)).strong());
+        });
+        ScrollArea::vertical().auto_shrink([false; 2]).show(ui, |ui| {
+            if let Some(place) = values(ui, &sheet) {
+                model.sheet.strike(place);
+            }
+            ui.separator();
+            Grid::new("exam").num_columns(2).show(ui, |ui| {
+                for ((name, form), text) in FIELDS.iter().zip(&mut self.fields) {
+                    ui.label(*name);
+                    let field = TextEdit::singleline(text).hint_text(*form);
+                    ui.add(field.desired_width(200.0).char_limit(200));
+                    ui.end_row();
+                }
+            });
+            ui.label("Findings");
+            let field = TextEdit::multiline(&mut self.findings).desired_rows(3).char_limit(20_000);
+            ui.add(field.desired_width(WIDTH - 20.0));
+            let stills = tools.stills().count();
+            ui.small(format!("{stills} saved stills go into the report (F2 saves one)."));
+        });
+    }
 }
 
 /// Draws measured and derived values; returns the place of the measurement that the user removes.

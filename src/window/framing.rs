@@ -2,7 +2,7 @@
 
 use egui::{Id, PointerButton, Rect, Ui, Vec2, vec2};
 
-use super::bmode::Place;
+use super::place::Place;
 
 /// Largest enlargement over the image that fits into its pane.
 const MOST: f32 = 12.0;

@@ -1,15 +1,13 @@
 //! Pictures of the scenes that ship, of which one can be opened.
 
 use std::path::PathBuf;
-use std::time::Instant;
 
 use egui::{
     Align2, Context, Id, Image, Key, RichText, Sense, TextureHandle, TextureOptions, Ui, vec2,
 };
 
-use super::leaving::{self, Way};
-use super::model::Model;
-use super::state::State;
+use super::panel::{Ask, Desk, Dock, Panel, Row};
+use super::way::Way;
 use super::{FIRST_STEPS, recent, style};
 use crate::scene::shipped::{self, SCENES, Shipped};
 
@@ -18,59 +16,67 @@ const PICTURE: egui::Vec2 = vec2(190.0, 130.0);
 /// Pictures in a row.
 const COLUMNS: usize = 3;
 
-/// The gallery.
+/// Its row in the list of panels.
+pub(super) const ROW: Row = Row {
+    name: "Scenes",
+    tip: "Pictures of the scenes that ship, to open one",
+    key: None,
+    dock: Dock::Over,
+    has_button: true,
+};
+
+/// The gallery. A click opens a scene, and asks first where something is not saved.
+#[derive(Default)]
 pub(super) struct Gallery {
-    /// True while it is open.
-    pub(super) open: bool,
     /// The reason why the last choice cannot be opened.
     problem: Option<String>,
     /// Files that were opened last, as of when it was opened.
     recent: Option<Vec<PathBuf>>,
 }
 
-impl Gallery {
-    /// A gallery that is open or not.
-    pub(super) fn new(open: bool) -> Self {
-        Self { open, problem: None, recent: None }
+impl Panel for Gallery {
+    fn row(&self) -> &'static Row {
+        &ROW
     }
-}
 
-/// Draws the gallery if it is open; a click opens a scene, or asks first where something is not saved.
-pub(super) fn show(ctx: &Context, model: &mut Model, state: &mut State, now: Instant) {
-    let gallery = &mut state.gallery;
-    if !gallery.open {
-        gallery.recent = None;
-        return;
+    fn follow(&mut self, _ctx: &Context, desk: &mut Desk<'_>) {
+        if !desk.common.open.has(&ROW) {
+            self.recent = None;
+        }
     }
-    let recent = gallery.recent.get_or_insert_with(recent::list);
-    let mut open = !ctx.input(|input| input.key_pressed(Key::Escape));
-    let window = egui::Window::new("Scenes")
-        .anchor(Align2::CENTER_CENTER, [0.0, 0.0])
-        .resizable(false)
-        .collapsible(false)
-        .open(&mut open);
-    let chosen = window.show(ctx, |ui| {
-        let shipped = pictures(ui).map(|scene| shipped::unpacked(scene.name));
-        let chosen = shipped.or(lately(ui, recent).map(Ok));
-        ui.separator();
-        for line in FIRST_STEPS {
-            ui.label(line);
+
+    fn show(&mut self, ui: &mut Ui, desk: &mut Desk<'_>) {
+        let recent = self.recent.get_or_insert_with(recent::list);
+        let mut open = !ui.input(|input| input.key_pressed(Key::Escape));
+        let window = egui::Window::new(ROW.name)
+            .anchor(Align2::CENTER_CENTER, [0.0, 0.0])
+            .resizable(false)
+            .collapsible(false)
+            .open(&mut open);
+        let chosen = window.show(ui.ctx(), |ui| {
+            let shipped = pictures(ui).map(|scene| shipped::unpacked(scene.name));
+            let chosen = shipped.or(lately(ui, recent).map(Ok));
+            ui.separator();
+            for line in FIRST_STEPS {
+                ui.label(line);
+            }
+            if let Some(problem) = &self.problem {
+                ui.label(RichText::new(problem).color(style::WARN));
+            }
+            chosen
+        });
+        desk.common.open.set(&ROW, open);
+        let Some(file) = chosen.and_then(|shown| shown.inner).flatten() else {
+            return;
+        };
+        match file {
+            Ok(path) => {
+                *self = Self::default();
+                desk.common.open.set(&ROW, false);
+                desk.common.asks.push(Ask::Leave(Way::Open(path)));
+            }
+            Err(error) => self.problem = Some(error.to_string()),
         }
-        if let Some(problem) = &gallery.problem {
-            ui.label(RichText::new(problem).color(style::WARN));
-        }
-        chosen
-    });
-    gallery.open = open;
-    let Some(file) = chosen.and_then(|shown| shown.inner).flatten() else {
-        return;
-    };
-    match file {
-        Ok(path) => {
-            *gallery = Gallery::new(false);
-            leaving::leave(Way::Open(path), model, state, now);
-        }
-        Err(error) => gallery.problem = Some(error.to_string()),
     }
 }
 

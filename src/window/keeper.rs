@@ -13,9 +13,9 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use serde::{Deserialize, Serialize};
 
-use super::leaving::Unsaved;
 use super::model::{Leftover, Model};
-use super::state::State;
+use super::tools::Tools;
+use super::unsaved::Unsaved;
 use crate::output::files;
 use crate::scene::file::{Entry, save};
 
@@ -116,8 +116,13 @@ impl Keeper {
     }
 
     /// Writes what is unsaved, if it has changed and the last time is long enough ago; returns when to call again.
-    pub(super) fn keep(&mut self, model: &Model, state: &State, now: Instant) -> Option<Instant> {
-        let unsaved = Unsaved::of_all(model, state);
+    pub(super) fn keep(
+        &mut self,
+        model: &Model,
+        (tools, with_pose): (&Tools, bool),
+        now: Instant,
+    ) -> Option<Instant> {
+        let unsaved = Unsaved::of_all(model, tools, with_pose);
         if unsaved.is_empty() {
             if self.kept.take().is_some() {
                 self.send(None);
@@ -135,7 +140,7 @@ impl Keeper {
         }
         (self.kept, self.written) = (Some(stand), now);
         let scene = model.file.path.canonicalize().unwrap_or_else(|_| model.file.path.clone());
-        let left = Leftover::of(model, state.tools.unfiled(model), now);
+        let left = Leftover::of(model, tools.unfiled(model), now);
         let session = Session { scene, at: self::now(), what: unsaved.words(), left };
         self.send(Some(Draft { entries: model.changes(true), session }));
         None

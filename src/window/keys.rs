@@ -1,23 +1,15 @@
 //! The keyboard: keys and their actions.
 
-use std::time::Instant;
+use egui::{Key, Modifiers};
 
-use egui::{Event, Key, Modifiers};
-
-use super::dual;
-use super::files::Purpose;
-use super::leaving::{self, Way};
-use super::mmode;
+use super::model::Axis;
 use super::model::calipers::Kind;
 use super::model::sheet::Tool;
-use super::model::{Axis, Model, Press, STEP, Source};
-use super::pads::{self, Word};
-use super::state::State;
-use crate::settings::{Group, Imaging, Probe};
+use super::panels;
 
 /// The action of a key.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Action {
+pub(super) enum Action {
     Move(Axis, f64),
     Gain(f64),
     Depth(f64),
@@ -36,19 +28,14 @@ enum Action {
     Redo,
     Save,
     Load,
-    Console,
-    View3d,
-    Planes,
-    Worksheet,
     Hold,
-    Timing,
     Flip(usize),
     Whole,
     Beside,
-    Mmode,
     Real,
     Layer,
-    Help,
+    /// Opens or closes a panel, by its place in the list.
+    Panel(usize),
     Close,
     Quit,
 }
@@ -61,7 +48,16 @@ const fn moves(back: Key, forth: Key, axis: Axis) -> [Binding; 2] {
     [(back, false, Action::Move(axis, -1.0)), (forth, false, Action::Move(axis, 1.0))]
 }
 
-/// Every key with its row in the list of keys; rows without a text belong to the one before.
+/// The place of the list of keys among the panels.
+const HELP: usize = {
+    let mut at = 0;
+    while !matches!(panels::ROWS[at].key, Some((Key::Questionmark, _))) {
+        at += 1;
+    }
+    at
+};
+
+/// Every key but those of panels, with its row in the list of keys; rows without a text belong to the one before.
 const BINDINGS: &[(&str, &[Binding], &str)] = &[
     (
         "Left Right",
@@ -155,55 +151,25 @@ const BINDINGS: &[(&str, &[Binding], &str)] = &[
         "save settings (with Shift: as), open a scene or take its settings",
     ),
     (
-        "C V X G T M B I",
-        &[
-            (Key::C, false, Action::Console),
-            (Key::V, false, Action::View3d),
-            (Key::X, false, Action::Worksheet),
-            (Key::G, false, Action::Planes),
-            (Key::T, false, Action::Timing),
-            (Key::M, false, Action::Mmode),
-            (Key::B, false, Action::Real),
-            (Key::I, false, Action::Layer),
-        ],
-        "console, 3D view, worksheet, planes of the volume, timings, M-mode, which pixels are real, tissues in colours",
+        "B I",
+        &[(Key::B, false, Action::Real), (Key::I, false, Action::Layer)],
+        "which pixels are real; tissues in colours",
     ),
-    (
-        "? Esc",
-        &[
-            (Key::Questionmark, false, Action::Help),
-            (Key::F1, false, Action::Help),
-            (Key::Escape, false, Action::Close),
-        ],
-        "this list; close it",
-    ),
+    // In the list they stand with the panels.
+    ("", &[(Key::F1, false, Action::Panel(HELP)), (Key::Escape, false, Action::Close)], ""),
     // The interface handles these itself.
     ("Ctrl+Plus Ctrl+Minus Ctrl+0", &[], "texts and controls larger, smaller, as usual"),
     ("Ctrl+Q", &[(Key::Q, true, Action::Quit)], "quit"),
 ];
 
 /// Keys and their actions, for the list on the screen.
-pub(super) fn list() -> impl Iterator<Item = (&'static str, &'static str)> {
-    BINDINGS.iter().map(|(keys, _, text)| (*keys, *text))
-}
-
-/// Carries out the pressed keys, unless a field is being typed into or a dialog is open.
-pub(super) fn apply(ctx: &egui::Context, model: &mut Model, state: &mut State, now: Instant) {
-    if ctx.egui_wants_keyboard_input() || state.has_dialog() {
-        return;
-    }
-    let pressed = ctx.input(|input| {
-        let presses = input.events.iter().filter_map(|event| match event {
-            Event::Key { key, pressed: true, modifiers, .. } => Some((*key, *modifiers)),
-            _ => None,
-        });
-        presses.collect::<Vec<_>>()
-    });
-    for (key, modifiers) in pressed {
-        if let Some(action) = action(key, modifiers) {
-            carry_out(action, modifiers, model, state, now);
-        }
-    }
+pub(super) fn list() -> impl Iterator<Item = (String, String)> {
+    let panels = panels::ROWS.into_iter().filter_map(|row| Some((row.key?.1, row.name)));
+    let (keys, names): (Vec<_>, Vec<_>) = panels.unzip();
+    let panels =
+        (keys.join(" "), format!("open and close: {} (Esc closes this list)", names.join(", ")));
+    let own = BINDINGS.iter().filter(|(keys, ..)| !keys.is_empty());
+    own.map(|(keys, _, text)| ((*keys).to_owned(), (*text).to_owned())).chain([panels])
 }
 
 /// The tool that a key takes. The code that follows the pointer calls it: a click before the key belongs to the
@@ -215,133 +181,27 @@ pub(super) fn tool(key: Key, modifiers: Modifiers) -> Option<Tool> {
     }
 }
 
-fn action(key: Key, modifiers: Modifiers) -> Option<Action> {
-    let bindings = BINDINGS.iter().flat_map(|(_, bindings, _)| *bindings);
-    let mut found = bindings.filter(|b| b.0 == key && b.1 == modifiers.command);
-    found.next().map(|b| b.2)
+/// What a key does.
+pub(super) fn action(key: Key, modifiers: Modifiers) -> Option<Action> {
+    all().find(|b| b.0 == key && b.1 == modifiers.command).map(|b| b.2)
 }
 
-/// Carries out the state of the game pads: the probe moves on, and buttons act as keys do.
-pub(super) fn apply_pads(word: &Word, model: &mut Model, state: &mut State, now: Instant) {
-    for (axis, amount) in pads::steps(word.travel) {
-        model.move_by(Source::Pad, axis, amount, now);
-    }
-    for press in &word.presses {
-        let action = match *press {
-            Press::Freeze => Action::Freeze,
-            Press::Play => Action::Play,
-            Press::Record => Action::Record,
-            Press::Gain(by) => Action::Gain(by),
-            Press::Depth(by) => Action::Depth(by),
-            Press::Home => {
-                model.place_probe(Source::Pad, model.home, now);
-                continue;
-            }
-        };
-        carry_out(action, Modifiers::NONE, model, state, now);
-    }
-}
-
-fn carry_out(
-    action: Action,
-    modifiers: Modifiers,
-    model: &mut Model,
-    state: &mut State,
-    now: Instant,
-) {
-    let before = model.settings.clone();
-    match action {
-        Action::Move(axis, steps)
-            if state.tools.nudge(
-                &mut model.sheet,
-                axis,
-                // On the screen: turned over, the image's axes point the other way.
-                if state.framing.flipped[usize::from(axis != Axis::Lateral)] {
-                    -steps
-                } else {
-                    steps
-                },
-                modifiers.shift,
-            ) => {}
-        Action::Move(axis, steps) => {
-            let step = if axis.shifts() { STEP[0] } else { STEP[1] };
-            let fine = if modifiers.shift { 0.25 } else { 1.0 };
-            model.move_probe(axis, steps * step * fine, now);
-        }
-        Action::Gain(by) => {
-            let gain = &mut model.settings.imaging.gain;
-            *gain = Imaging::clamped("gain", *gain + by);
-        }
-        Action::Depth(by) => {
-            let depth = &mut model.settings.probe.depth;
-            // Ten millimetres above nothing are a lower limit of their own.
-            *depth = Probe::clamped("depth", (*depth + by).max(10.0));
-        }
-        Action::Freeze => model.freeze(!model.frozen, now),
-        Action::Frame(by) if model.frozen => state.tools.cine.step(by),
-        Action::Loop if model.frozen => {
-            let cine = &mut state.tools.cine;
-            cine.play(!cine.is_playing(), now);
-        }
-        Action::Frame(_) | Action::Loop => {}
-        // Taken in order with the pointer's events: see `tool`.
-        Action::Take(_) => {}
-        Action::Delete => drop(model.sheet.delete()),
-        Action::Still => state.tools.want_still(),
-        Action::Clip => state.tools.want_clip(),
-        Action::Play if model.animated => {
-            model.clock.play(!model.clock.is_playing(), now);
-            model.touch(now);
-        }
-        Action::Play => {}
-        Action::Home => model.place_probe(Source::Keyboard, model.home, now),
-        Action::Record => leaving::record(model, state, now),
-        Action::Replay => model.replay(now),
-        Action::Undo => return model.undo(now),
-        Action::Redo => return model.redo(now),
-        Action::Save if modifiers.shift => state.files.ask(Purpose::Save, model),
-        Action::Save => state.files.save(model),
-        Action::Load => state.files.ask(Purpose::Load, model),
-        Action::Console => state.console = !state.console,
-        Action::View3d => state.view3d.open = !state.view3d.open,
-        Action::Planes => state.planes.open = !state.planes.open,
-        Action::Worksheet => state.exam.open = !state.exam.open,
-        Action::Hold => {
-            let stays = model.hold.as_ref().is_some_and(|hold| hold.stays);
-            model.stay_on_skin(!stays, now);
-        }
-        Action::Timing => state.timing = !state.timing,
-        Action::Flip(axis) => state.framing.flip(axis),
-        Action::Whole => state.framing.whole(),
-        Action::Beside if modifiers.shift => state.dual.end(),
-        Action::Beside => dual::hold(model, state, now),
-        Action::Mmode => mmode::toggle(model, now),
-        Action::Real => {
-            model.real.shown = !model.real.shown;
-            model.touch(now);
-        }
-        Action::Layer => {
-            model.layer.shown = !model.layer.shown;
-            model.touch(now);
-        }
-        Action::Help => state.help = !state.help,
-        Action::Close if state.help => state.help = false,
-        Action::Close => drop(model.sheet.cancel()),
-        Action::Quit => leaving::leave(Way::Quit, model, state, now),
-    }
-    model.note(&before, now);
+fn all() -> impl Iterator<Item = Binding> {
+    let panels = panels::ROWS.iter().enumerate();
+    let panels = panels.filter_map(|(at, row)| Some((row.key?.0, false, Action::Panel(at))));
+    BINDINGS.iter().flat_map(|(_, bindings, _)| *bindings).copied().chain(panels)
 }
 
 #[cfg(test)]
 mod tests {
     use egui::{Key, Modifiers};
 
-    use super::{Action, BINDINGS, action};
+    use super::{Action, HELP, action, all, panels};
     use crate::model::Axis;
 
     #[test]
     fn no_key_does_two_things_and_every_movement_has_two() {
-        let all: Vec<_> = BINDINGS.iter().flat_map(|(_, b, _)| *b).collect();
+        let all: Vec<_> = all().collect();
         for (i, a) in all.iter().enumerate() {
             assert!(!all[..i].iter().any(|b| (a.0, a.1) == (b.0, b.1)), "{a:?}");
         }
@@ -365,5 +225,16 @@ mod tests {
         assert_eq!(action(Key::Q, Modifiers::SHIFT), rotate, "a finer step");
         assert_eq!(action(Key::Y, Modifiers::NONE), Some(Action::Beside));
         assert_eq!(action(Key::Y, Modifiers::COMMAND), Some(Action::Redo));
+    }
+
+    #[test]
+    fn panels_have_keys_and_names_of_their_own() {
+        let at = |name| panels::ROWS.iter().position(|row| row.name == name).map(Action::Panel);
+        assert_eq!(action(Key::T, Modifiers::NONE), at("Timings"));
+        assert_eq!(at("Keys"), Some(Action::Panel(HELP)));
+        let mut names: Vec<_> = panels::ROWS.iter().map(|row| row.name).collect();
+        names.sort_unstable();
+        names.dedup();
+        assert_eq!(names.len(), panels::ROWS.len());
     }
 }

@@ -2,21 +2,18 @@
 
 use std::time::Instant;
 
-use egui::{Align2, CentralPanel, Frame as Space, Panel, RichText, Ui};
+use egui::{CentralPanel, Frame as Space, Panel as Strip, Rect, RichText, Ui};
 use glam::DVec3;
 
-use super::bmode::{self, Place};
-use super::body;
-use super::console;
-use super::engine::Frame;
-use super::look::Pictured;
+use super::bmode;
 use super::model::Model;
-use super::model::mmode::Strip;
+use super::model::mmode::Strip as MmodeStrip;
+use super::panel::{Ask, Desk, Dock, Panel, Seen};
+use super::place::Place;
 use super::state::State;
-use super::statistics::Times;
 use super::{
-    beside, calipers, cine, deaths, dual, ecg, exam, files, gallery, keys, leaving, lesson, mmode,
-    naming, notice, offer, planes, saved, strip, style, timing, view3d,
+    beside, body, calipers, cine, deaths, dual, ecg, files, leaving, mmode, naming, notice, offer,
+    saved, strip, style, view3d,
 };
 use crate::settings::Exam;
 
@@ -40,107 +37,160 @@ pub(super) struct Places {
 }
 
 /// Draws the interface; returns the places of the pictures.
-pub(super) fn show(
-    ui: &mut Ui,
+pub(super) fn show(ui: &mut Ui, model: &mut Model, state: &mut State, seen: Seen<'_>) -> Places {
+    model.hold_pointer(ui.input(|input| input.pointer.any_down()));
+    let line = model.mmode.as_ref().map(MmodeStrip::line);
+    let context = ui.ctx().clone();
+    each(model, state, seen, |panel, desk| panel.follow(&context, desk));
+    each(model, state, seen, |panel, desk| {
+        if let Some(Dock::Right(width)) = open(panel, desk) {
+            let strip = Strip::right(panel.row().name).resizable(false).exact_size(width);
+            strip.show(ui, |ui| panel.show(ui, desk));
+        }
+    });
+    bar(ui, model, state, seen.now);
+    // Where there is no room for both, the panel takes the image's place.
+    let mut alone = false;
+    each(model, state, seen, |panel, desk| {
+        let Some(Dock::Below { height, alone: takes_all }) = open(panel, desk) else { return };
+        if takes_all && ui.available_height() < height + LEAST_IMAGE {
+            alone = true;
+            return;
+        }
+        let strip = Strip::bottom(panel.row().name).resizable(false).exact_size(height);
+        strip.show(ui, |ui| panel.show(ui, desk));
+    });
+    let shared = beside_image(ui, model, state, seen, alone);
+    let (image, held) = match alone {
+        true => {
+            CentralPanel::default().show(ui, |ui| {
+                each(model, state, seen, |panel, desk| {
+                    if let Some(Dock::Below { alone: true, .. }) = open(panel, desk) {
+                        panel.show(ui, desk);
+                    }
+                });
+            });
+            (None, None)
+        }
+        false => {
+            let centre = CentralPanel::default().frame(Space::NONE);
+            centre.show(ui, |ui| images(ui, model, state, seen)).inner
+        }
+    };
+    if let Some((room, width)) = shared {
+        view3d::divide(ui, room, width, &mut state.share);
+    }
+    if model.mmode.as_ref().map(MmodeStrip::line) != line {
+        model.touch(seen.now);
+    }
+    windows(ui, model, state, seen);
+    let view3d = state.panels.view3d.place;
+    Places { image, held, view3d }
+}
+
+/// Calls `act` with each panel in the order of the list, and what it draws from.
+fn each(
     model: &mut Model,
     state: &mut State,
-    statistics: &Times,
-    (frame, pictured): (Option<&Frame>, Option<&Pictured>),
-    now: Instant,
-) -> Places {
-    model.hold_pointer(ui.input(|input| input.pointer.any_down()));
-    let line = model.mmode.as_ref().map(Strip::line);
-    if state.console {
-        Panel::right("console")
-            .resizable(false)
-            .exact_size(console::WIDTH)
-            .show(ui, |ui| console::show(ui, model, state, now));
+    seen: Seen<'_>,
+    mut act: impl FnMut(&mut dyn Panel, &mut Desk<'_>),
+) {
+    let mut desk = Desk { model, common: &mut state.common, seen };
+    for panel in state.panels.all() {
+        act(panel, &mut desk);
     }
-    // One below the other where there is no room beside each other.
+}
+
+/// The dock of a panel; none while it is closed.
+fn open(panel: &dyn Panel, desk: &Desk<'_>) -> Option<Dock> {
+    panel.is_open(desk.model, &desk.common.open).then_some(panel.row().dock)
+}
+
+/// Draws the buttons of the panels, and the controls of the loop: one below the other where there is no room beside each other.
+fn bar(ui: &mut Ui, model: &mut Model, state: &mut State, now: Instant) {
     let more = if model.registration.is_some() { PLANES } else { 0.0 };
     let rows = if ui.available_width() < BAR + more { 2 } else { 1 };
-    Panel::bottom("bar").resizable(false).exact_size(cine::HEIGHT * rows as f32).show(ui, |ui| {
+    Strip::bottom("bar").resizable(false).exact_size(cine::HEIGHT * rows as f32).show(ui, |ui| {
         match rows {
             1 => drop(ui.horizontal_centered(|ui| {
                 toggles(ui, model, state, now);
                 ui.separator();
-                cine::show(ui, model, &mut state.tools, now);
+                cine::show(ui, model, &mut state.common.tools, now);
             })),
             _ => {
                 ui.add_space(6.0);
                 ui.horizontal(|ui| toggles(ui, model, state, now));
-                ui.horizontal(|ui| cine::show(ui, model, &mut state.tools, now));
+                ui.horizontal(|ui| cine::show(ui, model, &mut state.common.tools, now));
             }
         }
     });
-    // Where there is no room for both, the panel takes the image's place.
-    let alone = state.timing && ui.available_height() < timing::HEIGHT + LEAST_IMAGE;
-    if alone {
-        CentralPanel::default().show(ui, |ui| timing::show(ui, statistics, frame, model, state));
-    } else if state.timing {
-        Panel::bottom("timing")
-            .resizable(false)
-            .exact_size(timing::HEIGHT)
-            .show(ui, |ui| timing::show(ui, statistics, frame, model, state));
-    }
-    if model.mmode.is_some() {
-        Panel::bottom("mmode")
-            .resizable(false)
-            .exact_size(mmode::HEIGHT)
-            .show(ui, |ui| mmode::show(ui, model, &mut state.mmode));
-    } else {
-        state.mmode.close();
-    }
-    // The worksheet takes the place of the 3D view where there is no room for both.
-    let sheet = state.exam.open.then_some(exam::WIDTH).filter(|sheet| {
-        let room = ui.available_width();
-        let beside = state.view3d.open || state.planes.open;
-        let narrow =
-            view3d::width(room, state.share).filter(|_| beside).map(|view3d| room - view3d);
-        narrow.is_some_and(|left| left < sheet + LEAST_IMAGE)
-    });
-    // Transparent: the pictures are below the interface.
-    let planes = state.planes.open && model.registration.is_some();
-    let beside = (state.view3d.open || planes) && sheet.is_none();
-    let both = ui.available_rect_before_wrap();
-    let room = view3d::width(both.width(), state.share).filter(|_| beside && !alone);
-    if let Some(width) = room.filter(|_| planes) {
-        let panel = Panel::right("planes").resizable(false).exact_size(width);
-        let panel = panel.frame(Space::NONE).show_separator_line(false);
-        panel.show(ui, |ui| planes::show(ui, model, &mut state.planes, now));
-    }
-    let view3d = room.filter(|_| !planes).map(|width| {
-        let panel = Panel::right("view3d").resizable(false).exact_size(width);
-        let panel = panel.frame(Space::NONE).show_separator_line(false);
-        let shown = panel.show(ui, |ui| {
-            let place = view3d::show(ui, model, &mut state.view3d, pictured);
-            lesson::in_3d(ui, &place, model, &state.lesson, pictured);
-            place
-        });
-        if let Some((at, ray)) = state.view3d.asked.take() {
-            state.asked = Some((at, naming::Question::Sight(ray)));
+}
+
+/// Buttons that open the panels.
+fn toggles(ui: &mut Ui, model: &mut Model, state: &mut State, now: Instant) {
+    for panel in state.panels.all() {
+        let row = panel.row();
+        if !row.has_button || !panel.is_offered(model) {
+            continue;
         }
-        shown.inner
+        let is_open = panel.is_open(model, &state.common.open);
+        let button = ui.selectable_label(is_open, row.name);
+        if button.on_hover_text(row.hint()).clicked() {
+            panel.toggle(model, &mut state.common.open, now);
+        }
+    }
+}
+
+/// Draws the column at the left, and the panel that shares the room with the image, unless the image is not drawn. Returns
+/// that room, and what the panel has of its width.
+fn beside_image(
+    ui: &mut Ui,
+    model: &mut Model,
+    state: &mut State,
+    seen: Seen<'_>,
+    alone: bool,
+) -> Option<(Rect, f32)> {
+    let (mut last, mut left) = (None, None);
+    each(model, state, seen, |panel, desk| match open(panel, desk) {
+        Some(Dock::Beside) => last = Some(panel.row().name),
+        Some(Dock::Left(width)) => left = Some(width),
+        _ => {}
     });
-    if state.exam.open {
-        Panel::left("worksheet")
-            .resizable(false)
-            .exact_size(exam::WIDTH)
-            .show(ui, |ui| exam::show(ui, model, state));
+    let room = ui.available_rect_before_wrap();
+    let width = view3d::width(room.width(), state.share).filter(|_| last.is_some());
+    // The column takes the shared room where there is too little for both.
+    let fits = |width: &f32| left.is_none_or(|left| room.width() - width >= left + LEAST_IMAGE);
+    let width = width.filter(fits).filter(|_| !alone);
+    if let Some(width) = width {
+        // Transparent: the pictures are below the interface.
+        let strip = Strip::right("beside").resizable(false).exact_size(width);
+        let strip = strip.frame(Space::NONE).show_separator_line(false);
+        strip.show(ui, |ui| {
+            each(model, state, seen, |panel, desk| {
+                if Some(panel.row().name) == last {
+                    panel.show(ui, desk);
+                }
+            });
+        });
+        let view3d = &mut state.panels.view3d;
+        if let Some(place) = &view3d.place {
+            state.panels.lesson.in_3d(ui, place, model, seen.pictured);
+        }
+        if let Some((at, ray)) = view3d.asked.take() {
+            state.naming.asked = Some((at, naming::Question::Sight(ray)));
+        }
     }
-    let centre = CentralPanel::default().frame(Space::NONE);
-    let (image, held) = centre
-        .show(ui, |ui| match alone {
-            true => (None, None),
-            false => images(ui, model, state, frame, now),
-        })
-        .inner;
-    if let Some(width) = room {
-        view3d::divide(ui, both, width, &mut state.share);
-    }
-    if model.mmode.as_ref().map(Strip::line) != line {
-        model.touch(now);
-    }
+    each(model, state, seen, |panel, desk| {
+        if let Some(Dock::Left(width)) = open(panel, desk) {
+            let strip = Strip::left(panel.row().name).resizable(false).exact_size(width);
+            strip.show(ui, |ui| panel.show(ui, desk));
+        }
+    });
+    width.map(|width| (room, width))
+}
+
+/// Draws what lies over everything: messages, dialogs, panels that are windows; and does what was asked for.
+fn windows(ui: &mut Ui, model: &mut Model, state: &mut State, seen: Seen<'_>) {
     if let Some(problem) = &state.problem {
         let mut open = true;
         style::window("A problem", 64.0).open(&mut open).show(ui.ctx(), |ui| {
@@ -151,20 +201,30 @@ pub(super) fn show(
             state.problem = None;
         }
     }
-    notice::warnings(ui.ctx(), state);
-    naming::show(ui, model, state);
+    notice::warnings(ui.ctx(), &mut state.common);
+    if let Some(wanted) = naming::show(ui, model, &mut state.naming) {
+        state.panels.console.want(wanted, &mut state.common.open);
+    }
     deaths::show(ui.ctx(), model, state);
     match state.leaving.is_some() {
         _ if state.offer.is_some() => offer::show(ui.ctx(), state),
-        true => leaving::show(ui.ctx(), model, state, now),
-        false => files::dialog(ui.ctx(), model, state, now),
+        true => leaving::show(ui.ctx(), model, state, seen.now),
+        false => {
+            let way = files::dialog(ui.ctx(), model, &mut state.common.files, seen.now);
+            state.common.asks.extend(way.map(Ask::Leave));
+        }
     }
-    lesson::show(ui.ctx(), model, &mut state.lesson, now);
-    gallery::show(ui.ctx(), model, state, now);
-    if state.help {
-        help(ui.ctx(), &mut state.help);
+    each(model, state, seen, |panel, desk| {
+        if open(panel, desk) == Some(Dock::Over) {
+            panel.show(ui, desk);
+        }
+    });
+    for ask in std::mem::take(&mut state.common.asks) {
+        match ask {
+            Ask::Leave(way) => leaving::leave(way, model, state, seen.now),
+            Ask::Record => leaving::record(model, state, seen.now),
+        }
     }
-    Places { image, held, view3d }
 }
 
 /// Draws what belongs to the image, and to one that is held beside it; returns their places.
@@ -172,11 +232,11 @@ fn images(
     ui: &mut Ui,
     model: &mut Model,
     state: &mut State,
-    frame: Option<&Frame>,
-    now: Instant,
+    seen: Seen<'_>,
 ) -> (Option<Place>, Option<Place>) {
+    let Seen { frame, now, .. } = seen;
     // A picture to be saved has its marks and nothing that is pressed.
-    let bare = state.tools.wants_shot(model, &state.dual);
+    let bare = state.common.tools.wants_shot(model, state.dual.is_on());
     let [room, beside] = state.dual.rooms(ui.max_rect());
     let held = state.dual.show(ui, (beside, bare), model, &state.framing);
     let place = match frame {
@@ -186,25 +246,25 @@ fn images(
             None
         }
     };
-    state.tools.cleared = bare;
+    state.common.tools.cleared = bare;
     let (sheet, listens) = (&mut model.sheet, !state.has_dialog());
     let kind = model.settings.imaging.exam;
     if let (Some(place), Some(frame)) = (&place, frame) {
         calipers::show(ui, sheet, place, frame, (kind, listens, bare));
-        let newest = state.tools.cine.newest().map(|newest| newest.seconds);
+        let newest = state.common.tools.cine.newest().map(|newest| newest.seconds);
         ecg::show(ui, place, (frame, newest), model.beat.filter(|_| kind == Exam::Cardiac));
         state.framing.follow(ui, place);
         if let Some(at) = calipers::asked(ui, place) {
             let mm = place.mm(at);
             let point = frame.pose.transform_point3(DVec3::new(mm.x, 0.0, mm.y));
-            state.asked = Some((at, naming::Question::Place(point)));
+            state.naming.asked = Some((at, naming::Question::Place(point)));
         }
         calipers::table(ui, sheet, kind, frame, bare);
         if !bare {
             let dual = state.dual.is_on();
             let mark = (&mut model.body, kind, dual);
-            if strip::show(ui, &mut state.tools, sheet, mark) {
-                dual::hold(model, state, now);
+            if strip::show(ui, &mut state.common.tools, sheet, mark) {
+                dual::hold(model, &mut state.dual, &state.common.tools, now);
             }
         }
         if let Some(mark) = &mut model.body {
@@ -218,51 +278,10 @@ fn images(
         beside::show(ui, place, model, now);
     }
     if !bare {
-        notice::show(ui, &mut state.inputs);
+        notice::show(ui, &mut state.common.inputs);
         notice::recording(ui, model, now);
-        saved::show(ui, &mut state.tools);
+        saved::show(ui, &mut state.common.tools);
         notice::stale(ui, state.stale.as_deref());
     }
     (place, held)
-}
-
-/// Buttons that open the panels.
-fn toggles(ui: &mut Ui, model: &mut Model, state: &mut State, now: Instant) {
-    for (open, name, tip) in [
-        (&mut state.console, "Console", "Settings (C)"),
-        (&mut state.view3d.open, "3D", "Anatomy, probe and fan from outside (V)"),
-        (&mut state.timing, "Timings", "Where the time goes (T)"),
-        (&mut state.help, "Keys", "What the keyboard does (?)"),
-        (&mut state.gallery.open, "Scenes", "Pictures of the scenes that ship, to open one"),
-        (&mut state.lesson.open, "Lesson", "Tasks of this scene, with a guide and a score"),
-    ] {
-        ui.toggle_value(open, name).on_hover_text(tip);
-    }
-    if model.registration.is_some() {
-        let tip = "Three planes through the acquired volume, in place of the 3D view (G)";
-        ui.toggle_value(&mut state.planes.open, "Planes").on_hover_text(tip);
-    }
-    let tip = "One scanline against time (M)";
-    let strip = ui.selectable_label(model.mmode.is_some(), "M-mode");
-    if strip.on_hover_text(tip).clicked() {
-        mmode::toggle(model, now);
-    }
-}
-
-fn help(ctx: &egui::Context, open: &mut bool) {
-    egui::Window::new("Keys")
-        .anchor(Align2::CENTER_CENTER, [0.0, 0.0])
-        .resizable(false)
-        .collapsible(false)
-        .open(open)
-        .show(ctx, |ui| {
-            egui::Grid::new("keys").num_columns(2).spacing([16.0, 4.0]).show(ui, |ui| {
-                for (key, text) in keys::list() {
-                    ui.monospace(key);
-                    ui.label(text);
-                    ui.end_row();
-                }
-            });
-            ui.small("With Shift the probe moves a quarter of a step.");
-        });
 }

@@ -1,6 +1,6 @@
 //! Ways out of a session, and the question before something unsaved is lost.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Instant;
 
 use egui::{Key, Modifiers, RichText, Ui};
@@ -8,96 +8,29 @@ use egui::{Key, Modifiers, RichText, Ui};
 use super::model::Model;
 use super::state::State;
 use super::style::{self, button};
+use super::unsaved::Unsaved;
+use super::way::{Leaving, Stage, Way};
 
 /// Width of the question, points.
 const WIDTH: f32 = 400.0;
 
-/// Something by which unsaved work would be lost.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) enum Way {
-    /// The window is closed.
-    Quit,
-    /// Another scene is opened, or the same from its beginning.
-    Open(PathBuf),
-    /// Another trajectory is recorded.
-    Record,
-    /// Another trajectory is read from the console's file.
-    LoadTrajectory,
-}
-
-/// A way out, and how far it has come.
-pub(super) struct Leaving {
-    way: Way,
-    stage: Stage,
-    /// The reason why something was not saved.
-    problem: Option<String>,
-}
-
-#[derive(Clone, Copy, PartialEq)]
-enum Stage {
-    /// The question has not been drawn yet.
-    Begins,
-    /// The question is on the screen.
-    Asks,
-    /// It is gone: the image can be saved as it is in the window.
-    Draws,
-    /// What was asked for is being written.
-    Writes,
-}
-
-/// The unsaved work that a way would lose.
-pub(super) struct Unsaved {
-    settings: bool,
-    trajectory: bool,
-    marks: usize,
-}
-
-impl Unsaved {
-    fn of(way: &Way, model: &Model, state: &State) -> Self {
-        let whole = matches!(way, Way::Quit | Way::Open(_));
-        let recording = whole && model.trajectory.recorder.is_some();
-        Self {
-            settings: whole && model.is_modified(state.files.with_pose),
-            trajectory: recording || model.unsaved_trajectory().is_some(),
-            marks: if whole { state.tools.unfiled(model).iter().count() } else { 0 },
-        }
-    }
-
-    /// All that is unsaved.
-    pub(super) fn of_all(model: &Model, state: &State) -> Self {
-        Self::of(&Way::Quit, model, state)
-    }
-
-    /// What is unsaved, in words.
-    pub(super) fn words(&self) -> Vec<String> {
-        let settings = self.settings.then(|| "Settings, named poses".to_owned());
-        let way = self.trajectory.then(|| "A recorded trajectory".to_owned());
-        let marks = (self.marks > 0).then(|| format!("Measurements and texts, {}", self.marks));
-        settings.into_iter().chain(way).chain(marks).collect()
-    }
-
-    pub(super) fn is_empty(&self) -> bool {
-        !self.settings && !self.trajectory && self.marks == 0
-    }
-
-    /// What is unsaved, and where saving puts it.
-    fn lines(&self, model: &Model, state: &State) -> Vec<String> {
-        let scene = name(&model.file.path);
-        let settings = self.settings.then(|| format!("Settings: into {scene}"));
-        let way = self.trajectory.then(|| {
-            let seconds = match (&model.trajectory.recorder, model.unsaved_trajectory()) {
-                (Some(recorder), _) => recorder.seconds(Instant::now()),
-                (None, stored) => stored.map_or(0.0, |stored| stored.seconds()),
-            };
-            let file = state.inputs.free();
-            format!("The recorded trajectory, {seconds:.1} s: as {}", file.display())
-        });
-        let marks = (self.marks > 0).then(|| {
-            let folder = state.tools.folder.display();
-            format!("Measurements and texts, {}: with the image, in {folder}", self.marks)
-        });
-        settings.into_iter().chain(way).chain(marks).collect()
-    }
+/// What is unsaved, and where saving puts it.
+fn lines(unsaved: &Unsaved, model: &Model, state: &State) -> Vec<String> {
+    let scene = name(&model.file.path);
+    let settings = unsaved.settings.then(|| format!("Settings: into {scene}"));
+    let way = unsaved.trajectory.then(|| {
+        let seconds = match (&model.trajectory.recorder, model.unsaved_trajectory()) {
+            (Some(recorder), _) => recorder.seconds(Instant::now()),
+            (None, stored) => stored.map_or(0.0, |stored| stored.seconds()),
+        };
+        let file = state.common.inputs.free();
+        format!("The recorded trajectory, {seconds:.1} s: as {}", file.display())
+    });
+    let marks = (unsaved.marks > 0).then(|| {
+        let folder = state.common.tools.folder.display();
+        format!("Measurements and texts, {}: with the image, in {folder}", unsaved.marks)
+    });
+    settings.into_iter().chain(way).chain(marks).collect()
 }
 
 fn name(path: &Path) -> String {
@@ -109,7 +42,7 @@ pub(super) fn leave(way: Way, model: &mut Model, state: &mut State, now: Instant
     if state.leaving.is_some() {
         return;
     }
-    match Unsaved::of(&way, model, state).is_empty() {
+    match Unsaved::of(&way, model, &state.common.tools, state.common.files.with_pose).is_empty() {
         true => go(way, model, state, now),
         false => state.leaving = Some(Leaving { way, stage: Stage::Begins, problem: None }),
     }
@@ -123,16 +56,16 @@ pub(super) fn record(model: &mut Model, state: &mut State, now: Instant) {
     model.record(now);
     if let Some(stored) = model.unsaved_trajectory() {
         let text = "Ctrl+R replays it, Probe input in the console saves it";
-        state.tools.notices.tell(format!("Recorded {:.1} s. {text}.", stored.seconds()));
+        state.common.tools.notices.tell(format!("Recorded {:.1} s. {text}.", stored.seconds()));
     }
 }
 
 fn go(way: Way, model: &mut Model, state: &mut State, now: Instant) {
     match way {
         Way::Quit => state.quit = true,
-        Way::Open(path) => state.files.wanted = Some(path),
+        Way::Open(path) => state.common.files.wanted = Some(path),
         Way::Record => model.record(now),
-        Way::LoadTrajectory => state.inputs.load(model, now),
+        Way::LoadTrajectory => state.common.inputs.load(model, now),
     }
 }
 
@@ -144,15 +77,15 @@ pub(super) fn show(ctx: &egui::Context, model: &mut Model, state: &mut State, no
     match leaving.stage {
         Stage::Begins | Stage::Asks => return ask(ctx, leaving, model, state, now),
         Stage::Draws => {
-            state.tools.want_still();
+            state.common.tools.want_still();
             leaving.stage = Stage::Writes;
             state.leaving = Some(leaving);
         }
-        Stage::Writes if state.tools.is_saving() => state.leaving = Some(leaving),
+        Stage::Writes if state.common.tools.is_saving() => state.leaving = Some(leaving),
         Stage::Writes => {
-            state.tools.collect();
+            state.common.tools.collect();
             // The reason is said over the bar, with another folder to choose.
-            if !state.tools.notices.has_failed() {
+            if !state.common.tools.notices.has_failed() {
                 go(leaving.way, model, state, now);
             }
         }
@@ -174,8 +107,9 @@ fn ask(
     state: &mut State,
     now: Instant,
 ) {
-    let unsaved = Unsaved::of(&leaving.way, model, state);
-    let lines = unsaved.lines(model, state);
+    let unsaved =
+        Unsaved::of(&leaving.way, model, &state.common.tools, state.common.files.with_pose);
+    let lines = lines(&unsaved, model, state);
     let fresh = leaving.stage == Stage::Begins;
     leaving.stage = Stage::Asks;
     let shown = style::window("Not saved", 64.0).show(ctx, |ui| {
@@ -239,14 +173,14 @@ fn save(
         if model.trajectory.recorder.is_some() {
             model.record(now);
         }
-        state.inputs.path = state.inputs.free().display().to_string();
-        state.inputs.save(&mut model.trajectory);
-        if let Some(problem) = &state.inputs.problem {
+        state.common.inputs.path = state.common.inputs.free().display().to_string();
+        state.common.inputs.save(&mut model.trajectory);
+        if let Some(problem) = &state.common.inputs.problem {
             return Err(problem.clone());
         }
     }
     if unsaved.settings {
-        state.files.save(model);
+        state.common.files.save(model);
     }
-    Ok(!state.files.is_asking())
+    Ok(!state.common.files.is_asking())
 }

@@ -16,6 +16,7 @@ use self::measured::Measured;
 use super::look::Pictured;
 use super::model::trajectory::Recorder;
 use super::model::{Model, Source};
+use super::panel::{Desk, Dock, Panel, Row};
 use super::style::{self, button};
 use super::view3d;
 use crate::scene::task::{Goal, Task};
@@ -27,10 +28,19 @@ const WIDTH: f32 = 300.0;
 /// Colour of the target, and of the way that was gone.
 const GHOST: Color32 = Color32::from_rgb(120, 210, 120);
 
+/// Its row in the list of panels.
+pub(super) const ROW: Row = Row {
+    name: "Lesson",
+    tip: "Tasks of this scene, with a guide and a score",
+    key: None,
+    dock: Dock::Over,
+    has_button: true,
+};
+
 /// The panel's state; not saved.
 pub(super) struct Lesson {
     /// True while the panel is open.
-    pub(super) open: bool,
+    open: bool,
     /// The chosen task.
     chosen: usize,
     /// True in examiner's mode: no guide.
@@ -105,106 +115,119 @@ impl Lesson {
     fn guides(&self) -> bool {
         self.open && self.run.is_some() && self.guide && !self.examiner
     }
+}
 
-    /// Ends what belongs to a scene: another one has been opened.
-    pub(super) fn leave(&mut self) {
+impl Lesson {
+    /// Draws the target and the way of an attempt over the 3D view, by the picture's own camera.
+    pub(super) fn in_3d(
+        &self,
+        ui: &Ui,
+        place: &view3d::Place,
+        model: &Model,
+        pictured: Option<&Pictured>,
+    ) {
+        let Some(pictured) = pictured else { return };
+        let painter = ui.painter_at(place.rect);
+        let place = place.of(pictured);
+        let at = |point: DVec3| place.project(&pictured.look.camera, point);
+        if let Some(target) = self.ghost(model) {
+            let border = view3d::outline(&pictured.probe);
+            let border = border.into_iter().map(|point| at(target.transform_point3(point)));
+            if let Some(mut corners) = border.collect::<Option<Vec<_>>>() {
+                // The face closes it, so that it is no fan of the probe itself.
+                corners.extend(corners.first().copied());
+                painter.add(Shape::line(corners, Stroke::new(2.0, GHOST)));
+            }
+            let (start, _) = pictured.probe.ray(0, 0);
+            if let Some(mark) = at(target.transform_point3(DVec3::new(start.x, 0.0, start.z))) {
+                painter.circle_filled(mark, 4.0, GHOST);
+            }
+        }
+        let way: Option<Vec<_>> = self.way(model).iter().map(|&point| at(point.into())).collect();
+        if let Some(way) = way
+            && let Some(&end) = way.last()
+        {
+            painter.add(Shape::line(way, Stroke::new(2.0, GHOST)));
+            painter.circle_filled(end, 4.0, GHOST);
+        }
+    }
+}
+
+impl Panel for Lesson {
+    fn row(&self) -> &'static Row {
+        &ROW
+    }
+
+    /// Records the learner's way, and takes over the score once it is there.
+    fn follow(&mut self, ctx: &Context, desk: &mut Desk<'_>) {
+        let (lesson, model, now) = (self, &mut *desk.model, desk.seen.now);
+        lesson.open = desk.common.open.has(&ROW);
+        let guides = lesson.guides();
+        if let Some(run) = &mut lesson.run {
+            run.recorder.note("lesson", model.pose, now);
+            // Also where a key has switched it on.
+            if lesson.examiner && model.layer.shown {
+                model.layer.shown = false;
+                model.touch(now);
+            }
+            run.guided |= guides || model.layer.shown;
+        }
+        if let Some(marking) = &lesson.marking
+            && let Some(found) = marking.done()
+        {
+            lesson.marking = None;
+            match found {
+                Ok((attempt, problem)) => {
+                    (lesson.result, lesson.problem) = (Some(attempt), problem);
+                }
+                Err(problem) => lesson.problem = Some(problem),
+            }
+            // The 3D view, with the way, has been drawn before.
+            ctx.request_repaint();
+        }
+    }
+
+    fn show(&mut self, ui: &mut Ui, desk: &mut Desk<'_>) {
+        let lesson = self;
+        let Desk { model, common, seen } = desk;
+        let now = seen.now;
+        let mut open = true;
+        // At first beside the tools and above the bar: it grows upwards from there, off the results at the upper left.
+        let corner = ui.ctx().content_rect().left_bottom() + vec2(46.0, -44.0);
+        let window = egui::Window::new("Lesson").open(&mut open).auto_sized();
+        window.pivot(Align2::LEFT_BOTTOM).default_pos(corner).show(ui.ctx(), |ui| {
+            ui.set_width(if lesson.page.is_some() { history::WIDTH } else { WIDTH });
+            if model.tasks.is_empty() {
+                ui.label("This scene sets no tasks. They stand in its file, as [[task]].");
+                return;
+            }
+            lesson.chosen = lesson.chosen.min(model.tasks.len() - 1);
+            if let Some(page) = &mut lesson.page {
+                let of = (model.title.as_str(), model.tasks[lesson.chosen].name.as_str());
+                if !history::show(ui, page, of) {
+                    lesson.page = None;
+                }
+                return;
+            }
+            match lesson.run.is_some() {
+                false => before(ui, model, lesson, now),
+                true => during(ui, model, lesson, now),
+            }
+            if lesson.marking.is_some() {
+                ui.label("Scoring ...");
+            }
+            if let Some(problem) = &lesson.problem {
+                ui.label(RichText::new(problem).color(style::WARN));
+            }
+        });
+        lesson.open = open;
+        common.open.set(&ROW, open);
+    }
+
+    fn leave(&mut self) {
         let Self { open, examiner, guide, .. } = *self;
         let learner = std::mem::take(&mut self.learner);
         *self = Self { open, examiner, guide, learner, ..Self::new(self.wake.clone()) };
-    }
-}
-
-/// Draws the panel if it is open, and notes how the probe moves.
-pub(super) fn show(ctx: &Context, model: &mut Model, lesson: &mut Lesson, now: Instant) {
-    let guides = lesson.guides();
-    if let Some(run) = &mut lesson.run {
-        run.recorder.note("lesson", model.pose, now);
-        // Also where a key has switched it on.
-        if lesson.examiner && model.layer.shown {
-            model.layer.shown = false;
-            model.touch(now);
-        }
-        run.guided |= guides || model.layer.shown;
-    }
-    if let Some(marking) = &lesson.marking
-        && let Some(found) = marking.done()
-    {
-        lesson.marking = None;
-        match found {
-            Ok((attempt, problem)) => {
-                (lesson.result, lesson.problem) = (Some(attempt), problem);
-            }
-            Err(problem) => lesson.problem = Some(problem),
-        }
-        // The 3D view, with the way, has been drawn before.
-        ctx.request_repaint();
-    }
-    if !lesson.open {
-        return;
-    }
-    let mut open = true;
-    // At first beside the tools and above the bar: it grows upwards from there, off the results at the upper left.
-    let corner = ctx.content_rect().left_bottom() + vec2(46.0, -44.0);
-    let window = egui::Window::new("Lesson").open(&mut open).auto_sized();
-    window.pivot(Align2::LEFT_BOTTOM).default_pos(corner).show(ctx, |ui| {
-        ui.set_width(if lesson.page.is_some() { history::WIDTH } else { WIDTH });
-        if model.tasks.is_empty() {
-            ui.label("This scene sets no tasks. They stand in its file, as [[task]].");
-            return;
-        }
-        lesson.chosen = lesson.chosen.min(model.tasks.len() - 1);
-        if let Some(page) = &mut lesson.page {
-            let of = (model.title.as_str(), model.tasks[lesson.chosen].name.as_str());
-            if !history::show(ui, page, of) {
-                lesson.page = None;
-            }
-            return;
-        }
-        match lesson.run.is_some() {
-            false => before(ui, model, lesson, now),
-            true => during(ui, model, lesson, now),
-        }
-        if lesson.marking.is_some() {
-            ui.label("Scoring ...");
-        }
-        if let Some(problem) = &lesson.problem {
-            ui.label(RichText::new(problem).color(style::WARN));
-        }
-    });
-    lesson.open = open;
-}
-
-/// Draws the target and the way of an attempt over the 3D view, by the picture's own camera.
-pub(super) fn in_3d(
-    ui: &Ui,
-    place: &view3d::Place,
-    model: &Model,
-    lesson: &Lesson,
-    pictured: Option<&Pictured>,
-) {
-    let Some(pictured) = pictured else { return };
-    let painter = ui.painter_at(place.rect);
-    let place = place.of(pictured);
-    let at = |point: DVec3| place.project(&pictured.look.camera, point);
-    if let Some(target) = lesson.ghost(model) {
-        let border = view3d::outline(&pictured.probe);
-        let border = border.into_iter().map(|point| at(target.transform_point3(point)));
-        if let Some(mut corners) = border.collect::<Option<Vec<_>>>() {
-            // The face closes it, so that it is no fan of the probe itself.
-            corners.extend(corners.first().copied());
-            painter.add(Shape::line(corners, Stroke::new(2.0, GHOST)));
-        }
-        let (start, _) = pictured.probe.ray(0, 0);
-        if let Some(mark) = at(target.transform_point3(DVec3::new(start.x, 0.0, start.z))) {
-            painter.circle_filled(mark, 4.0, GHOST);
-        }
-    }
-    let way: Option<Vec<_>> = lesson.way(model).iter().map(|&point| at(point.into())).collect();
-    if let Some(way) = way
-        && let Some(&end) = way.last()
-    {
-        painter.add(Shape::line(way, Stroke::new(2.0, GHOST)));
-        painter.circle_filled(end, 4.0, GHOST);
     }
 }
 

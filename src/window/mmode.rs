@@ -1,23 +1,31 @@
 //! The M-mode strip below the image, and its line in the image.
 
-use egui::{
-    Align2, Color32, ColorImage, DragValue, FontId, PointerButton, Rect, Sense, Stroke,
-    TextureHandle, TextureOptions, Ui, pos2, vec2,
-};
+use std::time::Instant;
 
+use egui::{
+    Align2, Color32, ColorImage, Context, DragValue, FontId, Key, PointerButton, Rect, Sense,
+    Stroke, TextureHandle, TextureOptions, Ui, pos2, vec2,
+};
 use glam::DVec2;
 use serde_json::json;
 
-use super::bmode::Place;
 use super::captures::SavedStrip;
-use super::engine::Frame;
 use super::model::Model;
 use super::model::mmode::{Aim, ROWS, Span, Strip, nearest_line};
+use super::panel::{Desk, Dock, OpenPanels, Panel, Row};
+use super::picture::Frame;
+use super::place::Place;
 use super::style;
 use crate::probe::Probe;
 
-/// Height of the panel, points.
-pub(super) const HEIGHT: f32 = 208.0;
+/// Its row in the list of panels.
+pub(super) const ROW: Row = Row {
+    name: "M-mode",
+    tip: "One scanline against time",
+    key: Some((Key::M, "M")),
+    dock: Dock::Below { height: 208.0, alone: false },
+    has_button: true,
+};
 
 /// Widest raster, pixels.
 const WIDEST: usize = 1024;
@@ -32,7 +40,7 @@ const FEW: f64 = 200.0;
 const MOST: usize = 26;
 
 /// The state of the panel.
-pub(super) struct Panel {
+pub(super) struct MmodePanel {
     /// Seconds across the strip.
     pub(super) window: f64,
     /// The measurements, oldest first.
@@ -43,21 +51,14 @@ pub(super) struct Panel {
     texture: Option<(TextureHandle, (u64, f64, usize))>,
 }
 
-impl Default for Panel {
+impl Default for MmodePanel {
     fn default() -> Self {
         Self { window: 2.0, spans: Vec::new(), drawing: false, texture: None }
     }
 }
 
-impl Panel {
-    /// Releases the strip's texture: the next strip begins anew.
-    pub(super) fn close(&mut self) {
-        self.texture = None;
-    }
-}
-
 /// The strip on the screen with its measurements, to be saved.
-pub(super) fn saved(model: &Model, panel: &Panel) -> Option<SavedStrip> {
+pub(super) fn saved(model: &Model, panel: &MmodePanel) -> Option<SavedStrip> {
     let strip = model.mmode.as_ref()?;
     let (end, mm) = (strip.newest()?, strip.length()?);
     let line = match strip.line() {
@@ -87,76 +88,100 @@ pub(super) fn saved(model: &Model, panel: &Panel) -> Option<SavedStrip> {
     Some(SavedStrip { size: [WIDEST as u32, ROWS as u32], levels, facts })
 }
 
-/// Opens the strip on the image's middle scanline, or closes it.
-pub(super) fn toggle(model: &mut Model, now: std::time::Instant) {
-    model.mmode = match model.mmode {
-        Some(_) => None,
-        None => Some(Strip::new(Aim::Scanline(model.settings.probe.scanlines / 2))),
-    };
-    model.touch(now);
-}
+impl Panel for MmodePanel {
+    fn row(&self) -> &'static Row {
+        &ROW
+    }
 
-/// Draws the strip and its controls into the panel below the image.
-pub(super) fn show(ui: &mut Ui, model: &mut Model, panel: &mut Panel) {
-    let (probe, frozen) = (model.settings.probe.clone(), model.frozen);
-    let speed = model.clock.speed();
-    let animated = model.animated;
-    let Some(strip) = &mut model.mmode else {
-        return;
-    };
-    ui.horizontal_top(|ui| {
-        ui.vertical(|ui| {
-            ui.set_width(168.0);
-            ui.strong("M-mode");
-            ui.add_enabled_ui(!frozen, |ui| line(ui, strip, &probe));
-            width(ui, panel);
-            egui::ScrollArea::vertical().show(ui, |ui| {
-                measured(ui, panel);
-                remarks(ui, strip, animated, speed, panel);
+    fn is_open(&self, model: &Model, _open: &OpenPanels) -> bool {
+        model.mmode.is_some()
+    }
+
+    fn toggle(&self, model: &mut Model, _open: &mut OpenPanels, now: Instant) {
+        model.mmode = match model.mmode {
+            Some(_) => None,
+            None => Some(Strip::new(Aim::Scanline(model.settings.probe.scanlines / 2))),
+        };
+        model.touch(now);
+    }
+
+    fn follow(&mut self, _ctx: &Context, desk: &mut Desk<'_>) {
+        if desk.model.mmode.is_none() {
+            self.texture = None;
+        }
+    }
+
+    fn show(&mut self, ui: &mut Ui, desk: &mut Desk<'_>) {
+        let panel = self;
+        let model = &mut *desk.model;
+        let (probe, frozen) = (model.settings.probe.clone(), model.frozen);
+        let speed = model.clock.speed();
+        let animated = model.animated;
+        let Some(strip) = &mut model.mmode else {
+            return;
+        };
+        ui.horizontal_top(|ui| {
+            ui.vertical(|ui| {
+                ui.set_width(168.0);
+                ui.strong("M-mode");
+                ui.add_enabled_ui(!frozen, |ui| line(ui, strip, &probe));
+                width(ui, panel);
+                egui::ScrollArea::vertical().show(ui, |ui| {
+                    measured(ui, panel);
+                    remarks(ui, strip, animated, speed, panel);
+                });
             });
+            ui.separator();
+            let (area, response) = ui.allocate_exact_size(ui.available_size(), Sense::drag());
+            let inner = Rect::from_min_max(area.min, area.max - vec2(44.0, 18.0));
+            let end = strip.newest().unwrap_or(panel.window).max(panel.window);
+            draw(ui, strip, panel, inner, end);
+            let Some(depth) = strip.length() else { return };
+            rulers(ui, inner, depth, panel.window, end);
+            let at = |[seconds, mm]: [f64; 2]| {
+                let x = 1.0 - ((end - seconds) / panel.window) as f32;
+                inner.min + inner.size() * vec2(x, (mm / depth) as f32)
+            };
+            let under = |point: egui::Pos2| {
+                let share = (inner.clamp(point) - inner.min) / inner.size();
+                let seconds = end - panel.window * f64::from(1.0 - share.x);
+                [seconds, depth * f64::from(share.y)]
+            };
+            if response.drag_started_by(PointerButton::Primary) {
+                let origin = ui.input(|i| i.pointer.press_origin());
+                if let Some(from) = origin.map(under).filter(|_| panel.spans.len() < MOST) {
+                    panel.spans.push(Span { from, to: from });
+                    panel.drawing = true;
+                }
+            }
+            if let (true, Some(span), Some(point)) =
+                (panel.drawing, panel.spans.last_mut(), response.interact_pointer_pos())
+            {
+                span.to = under(point);
+            }
+            panel.drawing &= !response.drag_stopped();
+            response.on_hover_text("Drag from one point to another to measure time and depth");
+            for (letter, span) in ('A'..='Z').zip(&panel.spans) {
+                let line = Stroke::new(1.5, style::ACCENT);
+                let painter = ui.painter_at(inner);
+                painter.line_segment([at(span.from), at(span.to)], line);
+                for end in [span.from, span.to] {
+                    painter.circle_stroke(at(end), 4.0, line);
+                }
+                let place = at(span.to) + vec2(6.0, -6.0);
+                let font = FontId::proportional(12.0);
+                painter.text(place, Align2::LEFT_BOTTOM, letter, font, style::ACCENT);
+            }
         });
-        ui.separator();
-        let (area, response) = ui.allocate_exact_size(ui.available_size(), Sense::drag());
-        let inner = Rect::from_min_max(area.min, area.max - vec2(44.0, 18.0));
-        let end = strip.newest().unwrap_or(panel.window).max(panel.window);
-        draw(ui, strip, panel, inner, end);
-        let Some(depth) = strip.length() else { return };
-        rulers(ui, inner, depth, panel.window, end);
-        let at = |[seconds, mm]: [f64; 2]| {
-            let x = 1.0 - ((end - seconds) / panel.window) as f32;
-            inner.min + inner.size() * vec2(x, (mm / depth) as f32)
-        };
-        let under = |point: egui::Pos2| {
-            let share = (inner.clamp(point) - inner.min) / inner.size();
-            let seconds = end - panel.window * f64::from(1.0 - share.x);
-            [seconds, depth * f64::from(share.y)]
-        };
-        if response.drag_started_by(PointerButton::Primary) {
-            let origin = ui.input(|i| i.pointer.press_origin());
-            if let Some(from) = origin.map(under).filter(|_| panel.spans.len() < MOST) {
-                panel.spans.push(Span { from, to: from });
-                panel.drawing = true;
-            }
-        }
-        if let (true, Some(span), Some(point)) =
-            (panel.drawing, panel.spans.last_mut(), response.interact_pointer_pos())
-        {
-            span.to = under(point);
-        }
-        panel.drawing &= !response.drag_stopped();
-        response.on_hover_text("Drag from one point to another to measure time and depth");
-        for (letter, span) in ('A'..='Z').zip(&panel.spans) {
-            let line = Stroke::new(1.5, style::ACCENT);
-            let painter = ui.painter_at(inner);
-            painter.line_segment([at(span.from), at(span.to)], line);
-            for end in [span.from, span.to] {
-                painter.circle_stroke(at(end), 4.0, line);
-            }
-            let place = at(span.to) + vec2(6.0, -6.0);
-            let font = FontId::proportional(12.0);
-            painter.text(place, Align2::LEFT_BOTTOM, letter, font, style::ACCENT);
-        }
-    });
+    }
+
+    fn leave(&mut self) {
+        *self = Self::default();
+    }
+
+    fn lose(&mut self) {
+        *self = Self::default();
+    }
 }
 
 fn line(ui: &mut Ui, strip: &mut Strip, probe: &Probe) {
@@ -182,7 +207,7 @@ fn line(ui: &mut Ui, strip: &mut Strip, probe: &Probe) {
     });
 }
 
-fn width(ui: &mut Ui, panel: &mut Panel) {
+fn width(ui: &mut Ui, panel: &mut MmodePanel) {
     ui.horizontal(|ui| {
         ui.label("Width");
         style::choice(ui, ("width", 60.0), &mut panel.window, &WINDOWS, |s| format!("{s} s"))
@@ -190,7 +215,7 @@ fn width(ui: &mut Ui, panel: &mut Panel) {
     });
 }
 
-fn remarks(ui: &mut Ui, strip: &Strip, animated: bool, speed: f64, panel: &Panel) {
+fn remarks(ui: &mut Ui, strip: &Strip, animated: bool, speed: f64, panel: &MmodePanel) {
     let end = strip.newest().unwrap_or_default();
     if !animated {
         ui.small("Nothing in this scene moves: time is that of the images.");
@@ -211,7 +236,7 @@ fn remarks(ui: &mut Ui, strip: &Strip, animated: bool, speed: f64, panel: &Panel
     }
 }
 
-fn measured(ui: &mut Ui, panel: &mut Panel) {
+fn measured(ui: &mut Ui, panel: &mut MmodePanel) {
     if panel.spans.is_empty() {
         ui.small("Drag in the strip to measure.");
         return;
@@ -231,7 +256,7 @@ fn measured(ui: &mut Ui, panel: &mut Panel) {
     }
 }
 
-fn draw(ui: &Ui, strip: &Strip, panel: &mut Panel, inner: Rect, end: f64) {
+fn draw(ui: &Ui, strip: &Strip, panel: &mut MmodePanel, inner: Rect, end: f64) {
     let pixels = inner.width() * ui.ctx().pixels_per_point();
     let width = (pixels as usize).clamp(16, WIDEST);
     let wanted = (strip.revision(), panel.window, width);

@@ -53,7 +53,7 @@ use trajectory::Replay;
 pub use trajectory_state::{StoredTrajectory, TrajectoryState};
 pub use view3d::{Shown, View3d};
 
-use super::engine::{Film, Frame};
+use super::picture::{Film, Frame};
 use crate::scene::{NamedPose, Scene, Task};
 use crate::sim::Tracer;
 use crate::sim::fusion::Tint;

@@ -7,7 +7,6 @@ use egui::{Area, Frame, Id, Order, Pos2, RichText, Ui};
 use glam::DVec3;
 
 use super::model::{Model, Ray, Show};
-use super::state::State;
 use super::style::{self, button};
 use crate::scene::{Instance, Mesh, Scene, triangle};
 
@@ -27,11 +26,22 @@ pub(super) struct Answer {
     mesh: Option<usize>,
 }
 
+/// What is asked, and what was answered.
+#[derive(Default)]
+pub(super) struct Naming {
+    /// Where the pointer asks what lies there.
+    pub(super) asked: Option<(Pos2, Question)>,
+    /// The answer to that.
+    pub(super) answer: Option<Answer>,
+}
+
 /// A section of the console that the user wants to see.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Wanted {
-    Tissue,
-    Surface,
+    /// Of the tissue with this index.
+    Tissue(usize),
+    /// Of the surface of the mesh with this index.
+    Surface(usize),
 }
 
 /// Finds what was asked for in the scene as it is now.
@@ -133,13 +143,14 @@ fn nearest(
     first.filter(|(t, _)| t.is_finite()).map(|(_, index)| index)
 }
 
-/// Draws the answer beside the place that was asked for, until it is closed or another is asked for.
-pub(super) fn show(ui: &Ui, model: &Model, state: &mut State) {
-    let Some(answer) = &state.answer else { return };
+/// Draws the answer beside the place that was asked for, until it is closed or another is asked for. Returns the
+/// properties that the user wants to see.
+pub(super) fn show(ui: &Ui, model: &Model, naming: &mut Naming) -> Option<Wanted> {
+    let answer = naming.answer.as_ref()?;
     let (at, mesh) = (answer.at, answer.mesh);
     let tissue = mesh.map_or(model.background, |mesh| model.meshes[mesh].tissue);
     let name = mesh.map_or("background", |mesh| model.meshes[mesh].name.as_str());
-    let mut open = true;
+    let (mut open, mut wanted) = (true, None);
     let corner = at + egui::vec2(10.0, 6.0);
     let area = Area::new(Id::new("named")).order(Order::Foreground).fixed_pos(corner);
     area.constrain_to(ui.ctx().content_rect()).show(ui.ctx(), |ui| {
@@ -148,24 +159,24 @@ pub(super) fn show(ui: &Ui, model: &Model, state: &mut State) {
             ui.label(RichText::new(&model.settings.tissues[tissue].name).color(style::FAINT));
             ui.horizontal(|ui| {
                 if button(ui, "Tissue", "Its acoustic properties, in the console") {
-                    (state.tissue, state.wanted) = (tissue, Some(Wanted::Tissue));
+                    wanted = Some(Wanted::Tissue(tissue));
                 }
                 let Some(mesh) = mesh else { return };
                 if button(ui, "Surface", "How its surface reflects, in the console") {
-                    (state.mesh, state.wanted) = (mesh, Some(Wanted::Surface));
+                    wanted = Some(Wanted::Surface(mesh));
                 }
                 open = !button(ui, "x", "Close");
             });
         });
     });
-    if state.wanted.is_some() {
-        (state.console, open) = (true, false);
+    if wanted.is_some() {
         // The console is drawn before.
         ui.ctx().request_repaint();
     }
-    if !open || ui.input(|input| input.key_pressed(egui::Key::Escape)) {
-        state.answer = None;
+    if !open || wanted.is_some() || ui.input(|input| input.key_pressed(egui::Key::Escape)) {
+        naming.answer = None;
     }
+    wanted
 }
 
 #[cfg(test)]

@@ -2,9 +2,9 @@
 
 use egui::{Area, Color32, Context, Frame, Id, Order, Painter, Pos2, Stroke, TextEdit, Ui, vec2};
 
-use super::bmode::Place;
 use super::calipers::{label, to_screen};
 use super::model::sheet::{Note, Sheet, What};
+use super::place::Place;
 use crate::settings::Exam;
 use insonify_lab::exam::annotations;
 

@@ -6,7 +6,7 @@ use egui::{Align2, Area, Color32, FontId, Frame, Id, Rect, RichText, ScrollArea,
 
 use super::inputs::Inputs;
 use super::model::{Model, age};
-use super::state::State;
+use super::panel::Common;
 use super::style;
 use crate::igtl::TrackerState;
 
@@ -75,8 +75,8 @@ pub(super) fn stale(ui: &Ui, problem: Option<&str>) {
 }
 
 /// Lists what is suspicious about the scene, where that is wanted.
-pub(super) fn warnings(ctx: &egui::Context, state: &mut State) {
-    let State { warnings, warned, .. } = state;
+pub(super) fn warnings(ctx: &egui::Context, common: &mut Common) {
+    let Common { warnings, warned, .. } = common;
     style::window("Warnings", 64.0).open(warned).show(ctx, |ui| {
         ui.set_max_width(460.0);
         ScrollArea::vertical().max_height(300.0).show(ui, |ui| {

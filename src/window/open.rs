@@ -9,16 +9,18 @@ use winit::event_loop::EventLoopProxy;
 use winit::window::Window;
 
 use super::deaths::Deaths;
-use super::engine::{Frame, News};
-use super::leaving::{self, Way};
+use super::engine::News;
+use super::leaving;
 use super::link::Link;
 use super::look::{Look, Pictured};
 use super::opening::{Opened, Opening};
+use super::picture::Frame;
 use super::session::{self, Session, Wake};
 use super::state::State;
 use super::tools::Tools;
 use super::watch::Watch;
-use super::{Model, Options, ViewError, keys, orders};
+use super::way::Way;
+use super::{Model, Options, ViewError, acts, orders};
 use crate::gpu::Device;
 use crate::scene::Scene;
 
@@ -113,16 +115,16 @@ impl Open {
                         self.model.begin_replay(Instant::now());
                     }
                     self.model.film(&frame, film);
-                    self.state.tools.record((*frame).clone());
+                    self.state.common.tools.record((*frame).clone());
                     self.state.dual.refine(&frame);
-                    self.state.view3d.pace(frame.grade.budget_ms);
+                    self.state.panels.view3d.pace(frame.grade.budget_ms);
                     self.frame = Some(*frame);
                     self.unseen += u64::from(std::mem::replace(&mut self.fresh, true));
                     self.state.problem = None;
                 }
                 News::View3d(pictured) => {
                     self.pictures_ms.push(pictured.ms);
-                    self.state.view3d.learn(&pictured);
+                    self.state.panels.view3d.learn(&pictured);
                     self.pictured = Some(*pictured);
                 }
                 News::Preparing(what) => self.state.preparing = what,
@@ -151,7 +153,7 @@ impl Open {
 
     /// Sets the window's title: scene and file, and a mark where something is unsaved.
     fn entitle(&mut self) {
-        let (model, files) = (&self.model, &self.state.files);
+        let (model, files) = (&self.model, &self.state.common.files);
         let mark = match model.is_modified(files.with_pose) {
             true => "*",
             false => "",
@@ -197,7 +199,7 @@ impl Open {
 
     /// Draws if a drawing is due; else returns the time when it will be.
     pub(super) fn due(&mut self, now: Instant) -> Option<Instant> {
-        if self.state.inputs.due.is_some_and(|at| at <= now) {
+        if self.state.common.inputs.due.is_some_and(|at| at <= now) {
             // The tracker is lost, or has been for longer.
             self.look();
             self.window.request_redraw();
@@ -210,13 +212,14 @@ impl Open {
             true => None,
             false => self.keep(now),
         };
-        self.again.into_iter().chain(self.state.inputs.due).chain(kept).min()
+        self.again.into_iter().chain(self.state.common.inputs.due).chain(kept).min()
     }
 
     /// Keeps what is unsaved; returns when to do so again.
     fn keep(&mut self, now: Instant) -> Option<Instant> {
         let mut keeper = std::mem::take(&mut self.state.keeper);
-        let due = keeper.keep(&self.model, &self.state, now);
+        let common = &self.state.common;
+        let due = keeper.keep(&self.model, (&common.tools, common.files.with_pose), now);
         self.state.keeper = keeper;
         due
     }
@@ -228,10 +231,10 @@ impl Open {
 
     /// Takes over the news of the devices.
     fn look(&mut self) {
-        if self.state.inputs.look(&mut self.model) {
+        if self.state.common.inputs.look(&mut self.model) {
             self.session.engine.send_again();
         }
-        while let Some(request) = self.state.inputs.request() {
+        while let Some(request) = self.state.common.inputs.request() {
             let (now, mut wanted) = (Instant::now(), None);
             let outcome = orders::carry_out(&request.order, &mut self.model, &mut wanted, now);
             if let Some(path) = wanted {
@@ -240,8 +243,8 @@ impl Open {
             request.answer(outcome);
             self.window.request_redraw();
         }
-        let word = self.state.inputs.word.clone();
-        keys::apply_pads(&word, &mut self.model, &mut self.state, Instant::now());
+        let word = self.state.common.inputs.word.clone();
+        acts::apply_pads(&word, &mut self.model, &mut self.state, Instant::now());
     }
 
     /// Goes on without a simulation until the user wants it again.
@@ -249,7 +252,7 @@ impl Open {
         self.state.stopped = true;
         self.awaited = false;
         if self.coming.take().is_some() {
-            self.state.files.opening = self.opening.is_some();
+            self.state.common.files.opening = self.opening.is_some();
         }
         self.window.request_redraw();
     }

@@ -1,8 +1,6 @@
 //! Three planes through the acquired volume with the outlines of the meshes, in place of the 3D view:
 //! the pointer moves volume or model.
 
-use std::time::Instant;
-
 use egui::{
     Align2, Color32, ColorImage, FontId, Painter, PointerButton, Pos2, Rect, Response, Sense,
     Shape, Stroke, TextureHandle, TextureOptions, Ui, pos2, vec2,
@@ -11,6 +9,7 @@ use glam::{DAffine3, DVec3};
 
 use super::model::registration::{Outline, Plane, Registration};
 use super::model::{Model, Settings};
+use super::panel::{Desk, Dock, Panel, Row};
 use super::style::{self, button};
 use crate::scene::Display;
 
@@ -24,11 +23,18 @@ const OUTSIDE: Color32 = Color32::from_rgb(10, 22, 40);
 const LINES: [Color32; 2] =
     [Color32::from_rgb(255, 200, 60), Color32::from_rgba_premultiplied(22, 46, 52, 60)];
 
-/// State of the planes; not saved.
+/// Its row in the list of panels.
+pub(super) const ROW: Row = Row {
+    name: "Planes",
+    tip: "Three planes through the acquired volume, in place of the 3D view",
+    key: Some((egui::Key::G, "G")),
+    dock: Dock::Beside,
+    has_button: true,
+};
+
+/// The planes.
 #[derive(Default)]
-pub(super) struct State {
-    /// True while they are shown in place of the 3D view.
-    pub(super) open: bool,
+pub(super) struct Planes {
     /// Pictures of the three planes, with the inputs that they were made from.
     pictures: [Option<Picture>; 3],
 }
@@ -51,47 +57,71 @@ struct Key {
     pitch: f64,
 }
 
-/// Draws the planes into the whole of `ui`, one below the other.
-pub(super) fn show(ui: &mut Ui, model: &mut Model, state: &mut State, now: Instant) {
-    let room = ui.max_rect();
-    ui.painter_at(room).rect_filled(room, 0.0, style::BACK);
-    let Some(mut registration) = model.registration.take() else {
-        return;
-    };
-    let before = model.settings.clone();
-    let seconds = model.clock.at(now);
-    registration.follow(&model.settings, seconds);
-    buttons(ui, room, &mut registration, &mut state.open);
-    let top = room.top() + BAR;
-    let height = ((room.bottom() - top) / 3.0).floor();
-    for (number, plane) in Plane::ALL.iter().enumerate() {
-        let corner = pos2(room.left(), top + number as f32 * height);
-        let rect = Rect::from_min_size(corner, vec2(room.width(), height - 1.0));
-        let pitch = registration.extent / f64::from(rect.width().min(rect.height()));
-        let scale = ui.ctx().pixels_per_point();
-        let key = Key {
-            volume: model.settings.volume,
-            model: model.settings.model,
-            seconds,
-            middle: registration.middle,
-            size: [rect.width(), rect.height()].map(|x| (x * scale).max(1.0) as usize),
-            pitch: pitch / f64::from(scale),
-        };
-        let picture = &mut state.pictures[number];
-        if picture.as_ref().is_none_or(|p| p.of != key) {
-            *picture = Some(make(ui, plane, &registration, key));
-        }
-        if let Some(picture) = picture {
-            draw(&ui.painter_at(rect), rect, plane, picture, (&registration, pitch));
-        }
-        let response = ui.interact(rect, ui.id().with(plane.name), Sense::click_and_drag());
-        act(ui, &response, rect, plane, (&mut registration, &mut model.settings), pitch);
+impl Panel for Planes {
+    fn row(&self) -> &'static Row {
+        &ROW
     }
-    model.registration = Some(registration);
-    model.note(&before, now);
+
+    fn is_offered(&self, model: &Model) -> bool {
+        model.registration.is_some()
+    }
+
+    /// Draws the planes, one below the other.
+    fn show(&mut self, ui: &mut Ui, desk: &mut Desk<'_>) {
+        let Desk { model, common, seen } = desk;
+        let now = seen.now;
+        let room = ui.max_rect();
+        ui.painter_at(room).rect_filled(room, 0.0, style::BACK);
+        let Some(mut registration) = model.registration.take() else {
+            return;
+        };
+        let before = model.settings.clone();
+        let seconds = model.clock.at(now);
+        registration.follow(&model.settings, seconds);
+        if buttons(ui, room, &mut registration) {
+            common.open.set(&ROW, false);
+        }
+        let top = room.top() + BAR;
+        let height = ((room.bottom() - top) / 3.0).floor();
+        for (number, plane) in Plane::ALL.iter().enumerate() {
+            let corner = pos2(room.left(), top + number as f32 * height);
+            let rect = Rect::from_min_size(corner, vec2(room.width(), height - 1.0));
+            let pitch = registration.extent / f64::from(rect.width().min(rect.height()));
+            let scale = ui.ctx().pixels_per_point();
+            let key = Key {
+                volume: model.settings.volume,
+                model: model.settings.model,
+                seconds,
+                middle: registration.middle,
+                size: [rect.width(), rect.height()].map(|x| (x * scale).max(1.0) as usize),
+                pitch: pitch / f64::from(scale),
+            };
+            let picture = &mut self.pictures[number];
+            if picture.as_ref().is_none_or(|p| p.of != key) {
+                *picture = Some(make(ui, plane, &registration, key));
+            }
+            if let Some(picture) = picture {
+                draw(&ui.painter_at(rect), rect, plane, picture, (&registration, pitch));
+            }
+            let response = ui.interact(rect, ui.id().with(plane.name), Sense::click_and_drag());
+            act(ui, &response, rect, plane, (&mut registration, &mut model.settings), pitch);
+        }
+        model.registration = Some(registration);
+        model.note(&before, now);
+    }
+
+    fn leave(&mut self) {
+        *self = Self::default();
+    }
+
+    fn lose(&mut self) {
+        *self = Self::default();
+    }
 }
 
-fn buttons(ui: &mut Ui, room: Rect, registration: &mut Registration, open: &mut bool) {
+/// Draws the buttons; returns whether the planes are to be closed.
+fn buttons(ui: &mut Ui, room: Rect, registration: &mut Registration) -> bool {
+    let mut closes = false;
     let at = room.left_top() + vec2(10.0, 6.0);
     let line = Rect::from_min_max(at, pos2(room.right() - 8.0, at.y + 22.0));
     ui.scope_builder(egui::UiBuilder::new().max_rect(line), |ui| {
@@ -99,15 +129,14 @@ fn buttons(ui: &mut Ui, room: Rect, registration: &mut Registration, open: &mut 
             if button(ui, "To the mask", "Let the planes meet in the middle of the masks") {
                 registration.centre();
             }
-            if button(ui, "Close", "Back to the 3D view") {
-                *open = false;
-            }
+            closes = button(ui, "Close", "Back to the 3D view");
             let hint = "drag: move  Shift: turn  Ctrl: scale  right: meeting point  wheel: through";
             let hint = egui::RichText::new(hint).size(10.0).color(style::FAINT);
             // A view wider than its panel would lie over the image.
             ui.add(egui::Label::new(hint).truncate());
         });
     });
+    closes
 }
 
 /// Makes a plane's picture: samples the volume and cuts the meshes.

@@ -2,9 +2,9 @@
 
 use egui::{Align2, Color32, FontId, Rect, pos2, vec2};
 
-use super::engine::Frame;
 use super::model::Model;
 use super::model::real::COLOUR;
+use super::picture::Frame;
 use super::style;
 use crate::gpu::Image;
 use crate::scene::palette;

@@ -1,10 +1,9 @@
 //! The timing panel: times of the stages, frame by frame, and the use of the device's memory.
 
-use egui::{Color32, ScrollArea, Ui};
+use egui::{Color32, Key, ScrollArea, Ui};
 
-use super::engine::Frame;
-use super::model::Model;
-use super::state::State;
+use super::panel::{Desk, DeviceFacts, Dock, Panel, Row, Seen};
+use super::picture::Frame;
 use super::statistics::{Sample, Times};
 use super::style;
 use insonify_base::statistics::Statistics;
@@ -13,7 +12,16 @@ pub(super) mod costs;
 mod graph;
 
 /// Height of the panel, points.
-pub(super) const HEIGHT: f32 = 212.0;
+const HEIGHT: f32 = 218.0;
+
+/// Its row in the list of panels.
+pub(super) const ROW: Row = Row {
+    name: "Timings",
+    tip: "Where the time goes",
+    key: Some((Key::T, "T")),
+    dock: Dock::Below { height: HEIGHT, alone: true },
+    has_button: true,
+};
 
 /// Width of the totals, points.
 const TOTALS: f32 = 200.0;
@@ -23,7 +31,7 @@ const ROWS: usize = 8;
 
 /// Page beside the stages.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) enum Page {
+enum Page {
     /// Times of each of the last frames.
     #[default]
     Frames,
@@ -69,50 +77,59 @@ fn pair(values: &[f64]) -> [String; 2] {
     [found.median, found.p99].map(written)
 }
 
-pub(super) fn show(
-    ui: &mut Ui,
-    times: &Times,
-    frame: Option<&Frame>,
-    model: &Model,
-    state: &mut State,
-) {
-    // In a narrow window the rest is reached by scrolling.
-    ScrollArea::horizontal().show(ui, |ui| {
-        ui.horizontal_top(|ui| {
-            ui.vertical(|ui| {
-                ui.strong("Device time by stage, ms")
-                    .on_hover_text("Median and 99th percentile of the last frames");
-                stages(ui, times);
-            });
-            ui.separator();
-            ui.vertical(|ui| {
-                ui.set_width(TOTALS);
-                ui.strong("Frames and latency, ms");
-                totals(ui, times, frame, state);
-            });
-            ui.separator();
-            ui.vertical(|ui| {
-                ui.horizontal(|ui| {
-                    for (page, name, tip) in [
-                        (Page::Frames, "Frames", "Each of the last frames, by stage"),
-                        (
-                            Page::Structures,
-                            "Structures",
-                            "What it costs that rays follow what moves",
-                        ),
-                        (Page::Memory, "Memory", "What lies in the device's memory"),
-                    ] {
-                        ui.selectable_value(&mut state.times, page, name).on_hover_text(tip);
+/// The timing panel.
+#[derive(Default)]
+pub(super) struct Timing {
+    page: Page,
+}
+
+impl Panel for Timing {
+    fn row(&self) -> &'static Row {
+        &ROW
+    }
+
+    fn show(&mut self, ui: &mut Ui, desk: &mut Desk<'_>) {
+        let Seen { times, frame, .. } = desk.seen;
+        // Clear of the line above.
+        ui.add_space(6.0);
+        // In a narrow window the rest is reached by scrolling.
+        ScrollArea::horizontal().show(ui, |ui| {
+            ui.horizontal_top(|ui| {
+                ui.vertical(|ui| {
+                    ui.strong("Device time by stage, ms")
+                        .on_hover_text("Median and 99th percentile of the last frames");
+                    stages(ui, times);
+                });
+                ui.separator();
+                ui.vertical(|ui| {
+                    ui.set_width(TOTALS);
+                    ui.strong("Frames and latency, ms");
+                    totals(ui, times, frame, &desk.common.device);
+                });
+                ui.separator();
+                ui.vertical(|ui| {
+                    ui.horizontal(|ui| {
+                        for (page, name, tip) in [
+                            (Page::Frames, "Frames", "Each of the last frames, by stage"),
+                            (
+                                Page::Structures,
+                                "Structures",
+                                "What it costs that rays follow what moves",
+                            ),
+                            (Page::Memory, "Memory", "What lies in the device's memory"),
+                        ] {
+                            ui.selectable_value(&mut self.page, page, name).on_hover_text(tip);
+                        }
+                    });
+                    match self.page {
+                        Page::Frames => graph::show(ui, times),
+                        Page::Structures => costs::structures(ui, times, desk.model),
+                        Page::Memory => costs::memory(ui, frame, desk.common.device.heap),
                     }
                 });
-                match state.times {
-                    Page::Frames => graph::show(ui, times),
-                    Page::Structures => costs::structures(ui, times, model),
-                    Page::Memory => costs::memory(ui, frame, state.heap),
-                }
             });
         });
-    });
+    }
 }
 
 fn stages(ui: &mut Ui, times: &Times) {
@@ -145,7 +162,7 @@ fn stages(ui: &mut Ui, times: &Times) {
     });
 }
 
-fn totals(ui: &mut Ui, times: &Times, frame: Option<&Frame>, state: &State) {
+fn totals(ui: &mut Ui, times: &Times, frame: Option<&Frame>, facts: &DeviceFacts) {
     let wall = times.live(|s| s.wall);
     let device = times.of(Sample::device);
     egui::Grid::new("totals").num_columns(3).spacing([10.0, 1.0]).show(ui, |ui| {
@@ -193,6 +210,6 @@ fn totals(ui: &mut Ui, times: &Times, frame: Option<&Frame>, state: &State) {
         let text = format!("{grade}, budget {:.0} ms", grade.budget_ms);
         ui.add(egui::Label::new(text).truncate()).on_hover_text(grade.counts.to_string());
     }
-    let device = egui::RichText::new(&state.device).color(style::FAINT).small();
-    ui.add(egui::Label::new(device).truncate()).on_hover_text(&state.device);
+    let device = egui::RichText::new(&facts.name).color(style::FAINT).small();
+    ui.add(egui::Label::new(device).truncate()).on_hover_text(&facts.name);
 }

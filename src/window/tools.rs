@@ -9,12 +9,11 @@ use glam::{DAffine3, DVec2};
 use serde_json::{Value, json};
 
 use super::captures::{self, Captures, Clip, Format, SavedStrip, Sidecar, Still};
-use super::dual::Dual;
-use super::engine::Frame;
 use super::model::cine::Limit;
 use super::model::sheet::{Mark, Marks, Moment, Sheet};
 use super::model::sidecar;
 use super::model::{Axis, Cine, Model};
+use super::picture::Frame;
 use super::saved::Notices;
 use crate::gpu::{DeviceInfo, Image, Screenshot};
 use crate::output::dicom::Study;
@@ -152,8 +151,8 @@ impl Tools {
     }
 
     /// Returns whether a picture of the window is wanted.
-    pub(super) fn wants_shot(&self, model: &Model, dual: &Dual) -> bool {
-        let marked = !model.sheet.marks().is_empty() || model.body.is_some() || dual.is_on();
+    pub(super) fn wants_shot(&self, model: &Model, is_dual: bool) -> bool {
+        let marked = !model.sheet.marks().is_empty() || model.body.is_some() || is_dual;
         self.due == Some(Wanted::Still) && marked
     }
 
@@ -329,13 +328,6 @@ fn settings(model: &Model, frame: &Frame, pose: Option<&DAffine3>) -> Sidecar {
     let said =
         [("set", set.into()), ("settings", all), ("tracer", settings.tracer.to_string().into())];
     said.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()
-}
-
-impl Frame {
-    /// Pose and time of the frame.
-    pub(super) fn moment(&self) -> Moment {
-        Moment { pose: self.pose, seconds: self.seconds }
-    }
 }
 
 /// The part of a picture of the window inside `area`, pixels: left, top, right, bottom.

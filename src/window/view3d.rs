@@ -7,7 +7,8 @@ mod tissues;
 use std::time::{Duration, Instant};
 
 use egui::{
-    Align2, CursorIcon, FontId, Id, PointerButton, Rect, Response, Sense, Stroke, Ui, pos2, vec2,
+    Align2, Context, CursorIcon, FontId, Id, Key, PointerButton, Rect, Response, Sense, Stroke, Ui,
+    pos2, vec2,
 };
 use glam::{DVec2, DVec3};
 
@@ -16,6 +17,7 @@ pub(super) use fan::outline;
 use super::hold;
 use super::look::{Look, Pictured};
 use super::model::{Camera, Model, Ray};
+use super::panel::{Desk, Dock, Panel, Row};
 use super::style::{self, button};
 
 /// Least useful width of the view, points.
@@ -37,10 +39,19 @@ const STEADY: f64 = 1.5;
 /// Time without movement after which everything counts as at rest.
 const REST: Duration = Duration::from_millis(160);
 
-/// State of the 3D view; not saved.
-pub(super) struct State {
-    /// True while the view is open.
-    pub(super) open: bool,
+/// Its row in the list of panels.
+pub(super) const ROW: Row = Row {
+    name: "3D",
+    tip: "Anatomy, probe and fan from outside",
+    key: Some((Key::V, "V")),
+    dock: Dock::Beside,
+    has_button: true,
+};
+
+/// The 3D view.
+pub(super) struct View3dPanel {
+    /// Where it was drawn last, if it was.
+    pub(super) place: Option<Place>,
     /// True while the list of tissues is open.
     tissues: bool,
     /// Time until which something counts as moving: the camera, or probe and anatomy.
@@ -57,10 +68,10 @@ pub(super) struct State {
     hold: hold::State,
 }
 
-impl Default for State {
+impl Default for View3dPanel {
     fn default() -> Self {
         Self {
-            open: true,
+            place: None,
             tissues: false,
             moving: [None; 2],
             budget_ms: SWIFT,
@@ -72,7 +83,7 @@ impl Default for State {
     }
 }
 
-impl State {
+impl View3dPanel {
     /// Learns the time of a pixel from a finished picture.
     pub(super) fn learn(&mut self, pictured: &Pictured) {
         let [width, height] = pictured.look.sight.size.map(f64::from);
@@ -169,7 +180,7 @@ impl Place {
     }
 
     /// The view of the anatomy to be pictured here; `scale`: pixels per point.
-    pub(super) fn look(&self, model: &Model, state: &State, scale: f32) -> Look {
+    pub(super) fn look(&self, model: &Model, state: &View3dPanel, scale: f32) -> Look {
         let pixels = self.panel() * f64::from(scale);
         let detail = state.detail(pixels.x * pixels.y, Instant::now());
         let size = (pixels * detail).round().max(DVec2::ONE);
@@ -204,52 +215,60 @@ pub(super) fn divide(ui: &Ui, room: Rect, width: f32, share: &mut f32) {
     }
 }
 
-/// Draws everything over the picture into the whole of `ui`, and moves the camera.
-pub(super) fn show(
-    ui: &mut Ui,
-    model: &mut Model,
-    state: &mut State,
-    pictured: Option<&Pictured>,
-) -> Place {
-    let place = Place { rect: ui.max_rect() };
-    let id = ui.id().with("view3d");
-    let response = ui.interact(place.rect, id, Sense::click_and_drag());
-    if response.secondary_clicked()
-        && let Some(at) = response.interact_pointer_pos()
-    {
-        state.asked = Some((at, place.ray(&model.view3d.camera, at)));
+impl Panel for View3dPanel {
+    fn row(&self) -> &'static Row {
+        &ROW
     }
-    let before = model.view3d.camera;
-    if !hold::show(ui, &response, &place, model, &mut state.hold) {
-        navigate(ui, &response, &place, &mut model.view3d.camera);
+
+    fn follow(&mut self, _ctx: &Context, _desk: &mut Desk<'_>) {
+        self.place = None;
     }
-    state.watch(ui, model, before != model.view3d.camera);
-    let painter = ui.painter_at(place.rect);
-    if let Some(pictured) = pictured {
-        fan::show(&painter, &place.of(pictured), pictured, &model.view3d.wires);
-    } else {
-        let (middle, font) = (place.rect.center(), FontId::proportional(14.0));
-        let text = "Preparing the 3D view";
-        painter.text(middle, Align2::CENTER_CENTER, text, font, style::FAINT);
-    }
-    let edge = Stroke::new(1.0, egui::Color32::from_gray(48));
-    painter.vline(place.rect.left(), place.rect.y_range(), edge);
-    let below = place.rect.left_bottom() + vec2(10.0, -8.0);
-    let hint = match model.hold.is_some() {
-        _ if model.view3d.cut && !model.view3d.cuts(&model.pose) => {
-            "looked at along the image plane nothing can be cut: drag to turn"
+
+    /// Draws everything over the picture, and moves the camera.
+    fn show(&mut self, ui: &mut Ui, desk: &mut Desk<'_>) {
+        let (model, pictured) = (&mut *desk.model, desk.seen.pictured);
+        let place = Place { rect: ui.max_rect() };
+        let id = ui.id().with("view3d");
+        let response = ui.interact(place.rect, id, Sense::click_and_drag());
+        if response.secondary_clicked()
+            && let Some(at) = response.interact_pointer_pos()
+        {
+            self.asked = Some((at, place.ray(&model.view3d.camera, at)));
         }
-        true => "skin: press and drag slides, Shift leans, Ctrl+wheel rotates; right drag: turn",
-        false => "drag: turn    Shift+drag: move    wheel: nearer, farther",
-    };
-    let font = FontId::proportional(10.0);
-    painter.text(below, Align2::LEFT_BOTTOM, hint, font, style::FAINT);
-    compass::show(ui, &place, &mut model.view3d);
-    buttons(ui, &place, model, state);
-    if state.tissues {
-        tissues::show(ui, place.rect, &mut model.view3d.shown);
+        let before = model.view3d.camera;
+        if !hold::show(ui, &response, &place, model, &mut self.hold) {
+            navigate(ui, &response, &place, &mut model.view3d.camera);
+        }
+        self.watch(ui, model, before != model.view3d.camera);
+        let painter = ui.painter_at(place.rect);
+        if let Some(pictured) = pictured {
+            fan::show(&painter, &place.of(pictured), pictured, &model.view3d.wires);
+        } else {
+            let (middle, font) = (place.rect.center(), FontId::proportional(14.0));
+            let text = "Preparing the 3D view";
+            painter.text(middle, Align2::CENTER_CENTER, text, font, style::FAINT);
+        }
+        let edge = Stroke::new(1.0, egui::Color32::from_gray(48));
+        painter.vline(place.rect.left(), place.rect.y_range(), edge);
+        let below = place.rect.left_bottom() + vec2(10.0, -8.0);
+        let hint = match model.hold.is_some() {
+            _ if model.view3d.cut && !model.view3d.cuts(&model.pose) => {
+                "looked at along the image plane nothing can be cut: drag to turn"
+            }
+            true => {
+                "skin: press and drag slides, Shift leans, Ctrl+wheel rotates; right drag: turn"
+            }
+            false => "drag: turn    Shift+drag: move    wheel: nearer, farther",
+        };
+        let font = FontId::proportional(10.0);
+        painter.text(below, Align2::LEFT_BOTTOM, hint, font, style::FAINT);
+        compass::show(ui, &place, &mut model.view3d);
+        buttons(ui, &place, model, self);
+        if self.tissues {
+            tissues::show(ui, place.rect, &mut model.view3d.shown);
+        }
+        self.place = Some(place);
     }
-    place
 }
 
 fn navigate(ui: &Ui, response: &Response, place: &Place, camera: &mut Camera) {
@@ -273,7 +292,7 @@ fn navigate(ui: &Ui, response: &Response, place: &Place, camera: &mut Camera) {
     }
 }
 
-fn buttons(ui: &mut Ui, place: &Place, model: &mut Model, state: &mut State) {
+fn buttons(ui: &mut Ui, place: &Place, model: &mut Model, state: &mut View3dPanel) {
     let at = place.rect.left_top() + vec2(10.0, 8.0);
     let room = Rect::from_min_max(at, pos2(place.rect.right() - 8.0, at.y + 24.0));
     let pose = model.pose;
@@ -307,11 +326,11 @@ mod tests {
     fn a_slow_device_is_coarse_while_the_eye_moves_and_a_quick_one_fine() {
         let now = Instant::now();
         let detail = |moving: [bool; 2], ms: f64| {
-            let state = State {
+            let state = View3dPanel {
                 moving: moving.map(|moves| moves.then_some(now + REST)),
                 pixel_ms: ms / 1e5,
                 budget_ms: 100.0,
-                ..State::default()
+                ..View3dPanel::default()
             };
             state.detail(1e5, now)
         };
@@ -334,7 +353,7 @@ mod tests {
     #[test]
     fn at_rest_a_picture_stays_as_fine_as_it_is() {
         let now = Instant::now();
-        let mut state = State::default();
+        let mut state = View3dPanel::default();
         // About 60 ms, from which on pictures at rest have four times the pixels.
         let details = [59.0, 62.0, 55.0, 70.0, 59.0].map(|ms| {
             state.took(ms / 1e5);

@@ -1,9 +1,9 @@
 //! The colours of the tissues over the image.
 
 use insonify::gpu::{Image, ImageDim, ImageFormat, test_device};
-use insonify::sim::Tracer;
 use insonify::sim::labels::colours;
 use insonify::sim::layout::NONE;
+use insonify::sim::{Outputs, Shot, Tracer};
 
 use super::scenes::{add_layer, linear, tissue};
 use super::{frame, simulator};
@@ -22,8 +22,8 @@ fn colours_lie_over_the_pixels_of_their_tissues_and_leave_the_image_alone() {
     let image = Image::new(&device, "painted", ImageDim::D2, extent, ImageFormat::Rgba8Unorm);
     let image = image.expect("an image");
     for opacity in [0.35_f32, 1.0] {
-        simulator.paint_on(Some((image.clone(), opacity)));
-        frame(&mut simulator, &scene, 0);
+        let outputs = Outputs { painted: Some((&image, opacity)), ..Outputs::default() };
+        simulator.frames_into(&scene, &[Shot::of(&scene, 0)], &outputs).expect("a frame");
         let painted = simulator.painted_pixels().expect("no device error").expect("asked for");
         assert!(image.read_back().expect("read") == painted);
         assert!(simulator.pixels().expect("pixels") == plain);

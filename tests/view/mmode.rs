@@ -5,8 +5,8 @@ use std::time::Duration;
 use insonify::scene::Scene;
 use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer};
-use insonify::view::engine::{Pixels, Sector};
 use insonify::view::model::mmode::{Aim, ROWS, Strip};
+use insonify::view::picture::{Pixels, Sector};
 
 use super::desk::{Desk, Key};
 use super::tools::sidecar;

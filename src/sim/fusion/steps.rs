@@ -27,7 +27,8 @@ impl Simulator {
         &mut self,
         scene: &Scene,
     ) -> Result<Vec<(&'static str, Vec<u8>)>, SimError> {
-        let (Some(fused), Some(acquired), true) = (&self.lane().fusion, &scene.volume, self.fused)
+        let (Some(fused), Some(acquired), true) =
+            (&self.lane().fusion, &scene.volume, self.last.fused)
         else {
             return Ok(Vec::new());
         };
@@ -43,7 +44,7 @@ impl Simulator {
     /// Makes the intermediate images of the last frame everywhere, if it showed an acquired volume: frames themselves make
     /// them only around the border.
     pub(crate) fn complete_steps(&mut self) -> Result<(), SimError> {
-        if self.fused {
+        if self.last.fused {
             self.submissions.wait()?;
             self.device.once(|cmd| self.passes.fusion_steps(cmd))?;
         }
@@ -55,7 +56,7 @@ impl Simulator {
     /// # Errors
     /// A Vulkan error.
     pub fn fusion_steps(&mut self) -> Result<Option<FusionSteps>, SimError> {
-        if !self.fused {
+        if !self.last.fused {
             return Ok(None);
         }
         self.complete_steps()?;

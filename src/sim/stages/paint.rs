@@ -4,7 +4,7 @@ use super::super::labels::colours;
 use super::super::pass::{Array, Pass, Sizes, per_pixel};
 use super::super::passes::Passes;
 use super::super::{SimError, Simulator};
-use crate::gpu::{Buffer, Commands, GpuError, Image, Stage};
+use crate::gpu::{Buffer, Commands, GpuError, Stage};
 use crate::output::npy::Element::Word;
 use crate::scene::Scene;
 
@@ -18,7 +18,7 @@ pub const PAINT: Pass = Pass {
     ],
     extent: Some(per_pixel),
     then: Stage::Transfer,
-    // Nothing in a scene needs it; `Simulator::paint_on` asks for it.
+    // Nothing in a scene needs it; `Outputs::painted` asks for it.
     needed: |_| false,
     ..Pass::USUAL
 };
@@ -51,21 +51,12 @@ impl Passes {
 }
 
 impl Simulator {
-    /// Colours the tissues that are seen in the next frames in an image of their size, with an opacity of 0 to 1, beside
-    /// the one of [`Self::show_on`], which does not change; none stops it. Frames without labels leave the image
-    /// unchanged.
-    pub fn paint_on(&mut self, painted: Option<(Image, f32)>) {
-        self.painted_on = painted;
-    }
-
     /// The last frame with its tissues in colours, RGBA bytes row by row; none if this was not asked for or the frame
     /// had no labels.
     ///
     /// # Errors
     /// A Vulkan error.
     pub fn painted_pixels(&mut self) -> Result<Option<Vec<u8>>, SimError> {
-        let asked =
-            self.labelled && self.painted_on.is_some() && self.lane().buffers.has("painted");
-        asked.then(|| self.read("painted")).transpose()
+        self.last.painted.then(|| self.read("painted")).transpose()
     }
 }

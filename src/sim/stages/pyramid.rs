@@ -1,13 +1,10 @@
 //! `difference`, `reduce`, `collapse`: blending by bands, over a pyramid of the simulated image minus the
 //! acquired one.
 
-use std::sync::Arc;
-
+use super::super::fusion::is_banded;
 use super::super::pass::{Extent, Pass, per_pixel};
 use super::super::passes::Passes;
-use crate::gpu::{Buffer, BufferKind, Commands, Device, GpuError};
-use crate::scene::Scene;
-use crate::settings::Blend;
+use crate::gpu::{Commands, GpuError};
 
 /// The stage that computes the finest level.
 pub const DIFFERENCE: Pass = Pass {
@@ -30,52 +27,8 @@ pub const COLLAPSE: Pass = Pass {
     ..Pass::USUAL
 };
 
-/// True if frames of a scene are blended by bands.
-pub(crate) fn is_banded(scene: &Scene) -> bool {
-    scene.shows_volume() && scene.fusion.as_ref().is_some_and(|f| f.blend == Blend::Multiband)
-}
-
-/// A level of the pyramid.
-struct PyramidLevel {
-    /// Difference and weights per pixel, three floats.
-    sums: Buffer,
-    /// The sum that this level and the coarser ones add to the acquired image.
-    change: Buffer,
-}
-
-/// The levels, finest first; empty until they are needed.
-#[derive(Default)]
-pub(crate) struct Pyramid(Vec<PyramidLevel>);
-
-impl Pyramid {
-    /// Makes room for `levels` levels above the finest, of images of up to `pixels` pixels, whatever
-    /// their shape.
-    pub(crate) fn fit(
-        &mut self,
-        device: &Arc<Device>,
-        pixels: u64,
-        levels: u32,
-    ) -> Result<(), GpuError> {
-        while self.0.len() <= levels as usize {
-            // ceil(w / 2) ceil(h / 2) <= (w h + 1) / 2, for an image one pixel wide with equality.
-            let pixels = (0..self.0.len()).fold(pixels, |pixels, _| pixels.div_ceil(2));
-            let new = |name: &str, each: u64| {
-                device.buffer(name, (each * pixels).max(16), BufferKind::Storage)
-            };
-            self.0
-                .push(PyramidLevel { sums: new("band sums", 12)?, change: new("band change", 4)? });
-        }
-        Ok(())
-    }
-
-    /// The values added to the pixels of the acquired image.
-    pub(crate) fn change(&self) -> &Buffer {
-        &self.0[0].change
-    }
-}
-
 impl Passes {
-    /// Computes [`Pyramid::change`].
+    /// Computes [`Pyramid::change`](super::super::fusion::Pyramid::change).
     pub(crate) fn bands(&self, cmd: &mut Commands<'_>) -> Result<(), GpuError> {
         let fusion = self.lanes[0].fusion.as_ref();
         let top = fusion.and_then(|fusion| fusion.bands).expect("blended by bands") as usize;
@@ -84,13 +37,16 @@ impl Passes {
             let [width, height] = size_at(size, level);
             Extent::Threads([width, height, 1])
         };
-        self.run_with(cmd, &DIFFERENCE, &|lane| vec![("level", &lane.pyramid().0[0].sums)])?;
+        self.run_with(cmd, &DIFFERENCE, &|lane| vec![("level", &lane.pyramid().level(0).sums)])?;
         cmd.scope(REDUCE.name);
         for level in 0..top {
             let push = size_at(size, level);
             self.record(cmd, &REDUCE, threads(level + 1), bytemuck::bytes_of(&push), &|lane| {
-                let levels = &lane.pyramid().0;
-                vec![("fine", &levels[level].sums), ("coarse", &levels[level + 1].sums)]
+                let pyramid = lane.pyramid();
+                vec![
+                    ("fine", &pyramid.level(level).sums),
+                    ("coarse", &pyramid.level(level + 1).sums),
+                ]
             })?;
         }
         cmd.scope(COLLAPSE.name);
@@ -100,8 +56,8 @@ impl Passes {
             let coarsest = level == top;
             let push = [width, height, u32::from(coarsest)];
             self.record(cmd, &COLLAPSE, threads(level), bytemuck::bytes_of(&push), &|lane| {
-                let levels = &lane.pyramid().0;
-                let (here, above) = (&levels[level], &levels[(level + 1).min(top)]);
+                let pyramid = lane.pyramid();
+                let (here, above) = (pyramid.level(level), pyramid.level((level + 1).min(top)));
                 vec![
                     ("fine", &here.sums),
                     ("coarse", &above.sums),

@@ -3,7 +3,7 @@
 use super::super::pass::{Array, Pass, Sizes, per_pixel};
 use super::super::passes::Passes;
 use super::super::{SimError, Simulator};
-use crate::gpu::{Buffer, Commands, GpuError, Image, Stage};
+use crate::gpu::{Buffer, Commands, GpuError, Stage};
 use crate::output::npy::Element::Word;
 
 /// The stage.
@@ -13,7 +13,7 @@ pub const TINT: Pass = Pass {
     makes: &[Array::new("tinted", Word, 1, Sizes::pixels)],
     extent: Some(per_pixel),
     then: Stage::Transfer,
-    // Nothing in a scene needs it; `Simulator::tint_on` asks for it.
+    // Nothing in a scene needs it; `Outputs::tinted` asks for it.
     needed: |_| false,
     ..Pass::USUAL
 };
@@ -49,20 +49,12 @@ impl Passes {
 }
 
 impl Simulator {
-    /// Colours the acquired pixels of the next frames in an image of their size, beside the one of
-    /// [`Self::show_on`], which does not change; none stops it. Frames that show no acquired volume leave the
-    /// image unchanged.
-    pub fn tint_on(&mut self, tinted: Option<(Image, Tint)>) {
-        self.tinted_on = tinted;
-    }
-
     /// The last frame with its acquired pixels coloured, RGBA bytes row by row; none if this was not
     /// asked for or the frame showed no acquired volume.
     ///
     /// # Errors
     /// A Vulkan error.
     pub fn tinted_pixels(&mut self) -> Result<Option<Vec<u8>>, SimError> {
-        let asked = self.fused && self.tinted_on.is_some() && self.lane().buffers.has("tinted");
-        asked.then(|| self.read("tinted")).transpose()
+        self.last.tinted.then(|| self.read("tinted")).transpose()
     }
 }

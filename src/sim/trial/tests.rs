@@ -5,13 +5,12 @@ use std::sync::Arc;
 
 use bytemuck::Zeroable;
 
-use super::{RayHit, Trial, agree, id};
+use super::{RayHit, Trial, agree, id, tried};
 use crate::gpu::test_device;
 use crate::layout::NONE;
 use crate::scene::Scene;
 use crate::shaders::Library;
 use crate::skip::{Lacking, skip};
-use crate::tracer::tried;
 
 fn hit(instance: u32, t: f32) -> RayHit {
     RayHit { instance, t, ..RayHit::zeroed() }

@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 
 use super::files::{self, Claim, scaled};
 use super::{CaptureError, Outcome, Progress, SavedStrip, Sidecar};
-use crate::engine::Frame;
 use crate::output::dicom::{About, Loop};
 use crate::output::movie::Movie;
 use crate::output::mp4::{self, Mp4};
 use crate::output::picture::grey_png;
+use crate::picture::Frame;
 
 /// File format of a clip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

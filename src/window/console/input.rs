@@ -8,15 +8,16 @@ use egui::{DragValue, RichText, TextEdit, Ui};
 use super::controls::grid;
 use crate::igtl::{OPEN, TrackerState};
 use crate::inputs::Inputs;
-use crate::leaving::{self, Way};
 use crate::link::Report;
 use crate::model::{Model, Source, age};
 use crate::pads::Word;
-use crate::state::State;
+use crate::panel::{Ask, Desk};
 use crate::style::{self, button};
+use crate::way::Way;
 
-pub(super) fn show(ui: &mut Ui, model: &mut Model, state: &mut State, now: Instant) {
-    let inputs = &mut state.inputs;
+pub(super) fn show(ui: &mut Ui, desk: &mut Desk<'_>) {
+    let Desk { model, common, seen } = desk;
+    let (inputs, asks, now) = (&mut common.inputs, &mut common.asks, seen.now);
     let holder = model.devices.holder();
     grid(ui, "devices", |ui| {
         device(ui, "Keyboard", holder == Some(Source::Keyboard), |ui| {
@@ -35,8 +36,8 @@ pub(super) fn show(ui: &mut Ui, model: &mut Model, state: &mut State, now: Insta
     ui.add_space(4.0);
     network(ui, inputs);
     ui.add_space(4.0);
-    way(ui, model, state, now);
-    file(ui, model, state, now);
+    way(ui, model, asks, now);
+    file(ui, model, inputs, asks);
 }
 
 /// Draws a row: a device, marked where it has the probe, and its state.
@@ -136,12 +137,12 @@ fn replay(model: &Model, now: Instant) -> String {
 }
 
 /// Draws the controls for recording and replay.
-fn way(ui: &mut Ui, model: &mut Model, state: &mut State, now: Instant) {
+fn way(ui: &mut Ui, model: &mut Model, asks: &mut Vec<Ask>, now: Instant) {
     ui.horizontal(|ui| {
         let is_recording = model.trajectory.recorder.is_some();
         let word = if is_recording { "Stop recording" } else { "Record" };
         if button(ui, word, "Record where the probe goes, whatever moves it (R)") {
-            leaving::record(model, state, now);
+            asks.push(Ask::Record);
         }
         if is_recording {
             // The seconds count on while nothing else is drawn.
@@ -165,8 +166,7 @@ fn way(ui: &mut Ui, model: &mut Model, state: &mut State, now: Instant) {
 }
 
 /// Draws the controls for the trajectory's file.
-fn file(ui: &mut Ui, model: &mut Model, state: &mut State, now: Instant) {
-    let inputs = &mut state.inputs;
+fn file(ui: &mut Ui, model: &mut Model, inputs: &mut Inputs, asks: &mut Vec<Ask>) {
     let mut loads = false;
     ui.horizontal(|ui| {
         let field = TextEdit::singleline(&mut inputs.path).desired_width(180.0);
@@ -185,6 +185,6 @@ fn file(ui: &mut Ui, model: &mut Model, state: &mut State, now: Instant) {
         ui.label(RichText::new(problem).color(style::WARN));
     }
     if loads {
-        leaving::leave(Way::LoadTrajectory, model, state, now);
+        asks.push(Ask::Leave(Way::LoadTrajectory));
     }
 }

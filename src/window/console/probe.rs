@@ -3,20 +3,22 @@
 use egui::{ComboBox, Ui};
 
 use super::controls::{grid, group};
+use crate::exam;
 use crate::model::Settings;
+use crate::panel::OpenPanels;
 use crate::settings::{Exam, Group, Probe, Words};
 
-pub(super) fn show(ui: &mut Ui, settings: &mut Settings, worksheet: &mut bool) {
+pub(super) fn show(ui: &mut Ui, settings: &mut Settings, open: &mut OpenPanels) {
     let frequency = settings.probe.frequency;
     grid(ui, "preset", |ui| {
-        exams(ui, settings, worksheet);
+        exams(ui, settings, open);
         presets(ui, &mut settings.probe);
     });
     group(ui, Probe::TABLE, &mut settings.probe);
     settings.follow_frequency(frequency);
 }
 
-fn exams(ui: &mut Ui, settings: &mut Settings, worksheet: &mut bool) {
+fn exams(ui: &mut Ui, settings: &mut Settings, open: &mut OpenPanels) {
     let tip = "Kind of examination: sets probe, depth, focus, gain, dynamic range and time gain, and chooses the \
                names of measurements. A star: settings have been changed since";
     ui.label("Exam").on_hover_text(tip);
@@ -28,8 +30,7 @@ fn exams(ui: &mut Ui, settings: &mut Settings, worksheet: &mut bool) {
                 }
             }
         });
-        let tip = "Named measurements, what follows from them, and the report (X)";
-        ui.toggle_value(worksheet, "Worksheet").on_hover_text(tip);
+        open.button(ui, &exam::ROW);
     });
     ui.end_row();
 }

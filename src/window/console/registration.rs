@@ -6,17 +6,18 @@ use glam::{DAffine3, DQuat, DVec3};
 use super::controls::{explained, grid, section};
 use crate::model::Model;
 use crate::model::registration::Moves;
+use crate::panel::OpenPanels;
+use crate::planes;
 use crate::scene::file::SCALES;
 use crate::settings::{Display, Group};
 use crate::style::button;
 
-pub(super) fn show(ui: &mut Ui, model: &mut Model, planes: &mut bool) {
+pub(super) fn show(ui: &mut Ui, model: &mut Model, open: &mut OpenPanels) {
     let Some(registration) = &mut model.registration else {
         return;
     };
     ui.horizontal(|ui| {
-        ui.toggle_value(planes, "Planes")
-            .on_hover_text("Three planes through the volume with the meshes' lines (G)");
+        open.button(ui, &planes::ROW);
         ui.label("Moves:");
         for (moves, name, tip) in [
             (Moves::Volume, "Volume", "The volume moves; model and probe stay"),

@@ -4,11 +4,11 @@ use egui::{ComboBox, Ui};
 
 use super::controls::{grid, group};
 use crate::model::Settings;
+use crate::panel::DeviceFacts;
 use crate::settings::{Group, Live, Quality, Simulation};
 use crate::sim::Tracer;
-use crate::state::State;
 
-pub(super) fn show(ui: &mut Ui, settings: &mut Settings, state: &State, lattice: f64) {
+pub(super) fn show(ui: &mut Ui, settings: &mut Settings, device: &DeviceFacts, lattice: f64) {
     ui.horizontal(|ui| {
         ui.label("Quality").on_hover_text("Path and scatterer counts that suit the device");
         for (name, quality) in [
@@ -19,11 +19,11 @@ pub(super) fn show(ui: &mut Ui, settings: &mut Settings, state: &State, lattice:
             if ui.button(name).clicked() {
                 settings.simulation.cell = lattice / settings.probe.frequency;
                 settings.simulation.cell /= settings.simulation.crowding();
-                settings.simulation.set_quality(quality, state.machine);
+                settings.simulation.set_quality(quality, device.machine);
             }
         }
     });
-    grid(ui, "tracer", |ui| tracer(ui, &mut settings.tracer, state.ray_query));
+    grid(ui, "tracer", |ui| tracer(ui, &mut settings.tracer, device.ray_query));
     group(ui, Live::TABLE, &mut settings.live);
     let before = settings.simulation.density_scale;
     group(ui, Simulation::TABLE, &mut settings.simulation);

@@ -5,13 +5,12 @@ use std::time::Instant;
 
 use egui::{Button, Key, RichText, ScrollArea, TextEdit, Ui};
 
-use super::{Purpose, said};
-use crate::leaving::{self, Way};
+use super::{Files, Purpose, said};
 use crate::model::Model;
 use crate::recent;
 use crate::scene::SceneError;
-use crate::state::State;
 use crate::style::{self, button};
+use crate::way::Way;
 
 /// Most names listed of a folder.
 const LISTED: usize = 200;
@@ -106,11 +105,15 @@ fn here(folder: &Path) -> &Path {
     }
 }
 
-/// Draws the dialog, if a file is asked for.
-pub(crate) fn show(ctx: &egui::Context, model: &mut Model, state: &mut State, now: Instant) {
-    let Some(mut dialog) = state.files.dialog.take() else {
-        return;
-    };
+/// Draws the dialog, if a file is asked for. Returns the scene that is to be opened.
+pub(crate) fn show(
+    ctx: &egui::Context,
+    model: &mut Model,
+    files: &mut Files,
+    now: Instant,
+) -> Option<Way> {
+    let mut dialog = files.dialog.take()?;
+    let mut way = None;
     dialog.look();
     let mut open = true;
     let title = match dialog.purpose {
@@ -120,19 +123,20 @@ pub(crate) fn show(ctx: &egui::Context, model: &mut Model, state: &mut State, no
     let escape = ctx.input(|input| input.key_pressed(Key::Escape));
     let shown = style::window(title, 48.0).open(&mut open).show(ctx, |ui| {
         ui.set_width(WIDTH);
-        contents(ui, model, state, &mut dialog, now)
+        contents(ui, model, (files, &mut way), &mut dialog, now)
     });
     let is_done = shown.and_then(|s| s.inner).unwrap_or(false);
     if open && !is_done && !escape {
-        state.files.dialog = Some(dialog);
+        files.dialog = Some(dialog);
     }
+    way
 }
 
 /// Draws the dialog's contents; returns whether it has done its work.
 fn contents(
     ui: &mut Ui,
     model: &mut Model,
-    state: &mut State,
+    (files, way): (&mut Files, &mut Option<Way>),
     dialog: &mut Dialog,
     now: Instant,
 ) -> bool {
@@ -150,8 +154,8 @@ fn contents(
         ui.label(RichText::new(error).color(style::WARN));
     }
     let outcome = match dialog.purpose {
-        Purpose::Save => save(ui, model, state, dialog, confirmed),
-        Purpose::Load => load(ui, model, state, dialog, confirmed, now),
+        Purpose::Save => save(ui, model, files, dialog, confirmed),
+        Purpose::Load => load(ui, model, (files, way), dialog, confirmed, now),
     };
     let is_done = match outcome {
         Some(Ok(())) => true,
@@ -213,12 +217,11 @@ fn list(ui: &mut Ui, dialog: &mut Dialog) {
 fn save(
     ui: &mut Ui,
     model: &mut Model,
-    state: &mut State,
+    files: &mut Files,
     dialog: &mut Dialog,
     confirmed: bool,
 ) -> Option<Result<(), SceneError>> {
     let path = PathBuf::from(&dialog.path);
-    let files = &mut state.files;
     ui.checkbox(&mut files.with_pose, "with the probe's pose");
     let text = "The whole scene is written; the meshes that it names stay where they are.";
     ui.label(RichText::new(text).color(style::FAINT));
@@ -259,7 +262,7 @@ fn save(
 fn load(
     ui: &mut Ui,
     model: &mut Model,
-    state: &mut State,
+    (files, way): (&mut Files, &mut Option<Way>),
     dialog: &Dialog,
     confirmed: bool,
     now: Instant,
@@ -271,13 +274,13 @@ fn load(
         ui.label(RichText::new(text).color(style::FAINT));
         clicked
     };
-    let opening = state.files.opening;
+    let opening = files.opening;
     let text = match opening {
         true => "Opening. The image goes on until the scene is there.",
         false => "All of the file, from its beginning (Enter).",
     };
     if button(ui, !opening, "Open scene", text) || confirmed && !opening {
-        leaving::leave(Way::Open(path.clone()), model, state, now);
+        *way = Some(Way::Open(path.clone()));
     }
     ui.separator();
     let text = "[probe], [simulation] and [imaging], as far as the file has them. Anatomy and pose \

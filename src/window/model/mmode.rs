@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use glam::{DVec2, dvec2};
 
-use crate::engine::{Pixels, Sector};
+use crate::picture::{Pixels, Sector};
 use crate::probe::Probe;
 
 /// Grey levels of a column, from the beginning of its line to the end.
@@ -233,7 +233,7 @@ mod tests {
     use glam::dvec2;
 
     use super::{Aim, ROWS, Span, Strip, nearest_line};
-    use crate::engine::{Pixels, Sector};
+    use crate::picture::{Pixels, Sector};
     use crate::probe::{Kind, Probe};
 
     const SECTOR: Sector = Sector { left: -20.0, top: 0.0, pitch: 0.5 };

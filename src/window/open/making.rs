@@ -7,10 +7,9 @@ use winit::event_loop::ActiveEventLoop;
 use winit::window::Window;
 
 use super::{Open, Plan, gestures};
-use crate::exam::Examination;
 use crate::files::Files;
-use crate::gallery::Gallery;
 use crate::gpu::{Device, ValidationLog};
+use crate::help::Help;
 use crate::inputs::{self, Inputs};
 use crate::keeper::Keeper;
 use crate::lesson::Lesson;
@@ -18,11 +17,13 @@ use crate::link::Bell;
 use crate::model::{File, StoredTrajectory};
 use crate::opening::{self, Opened};
 use crate::output;
+use crate::panel::{Common, DeviceFacts, OpenPanels, Panel};
+use crate::panels::Panels;
 use crate::session::{self, Session};
 use crate::sim;
 use crate::state::State;
 use crate::watch::Watch;
-use crate::{Model, ViewError, planes, recent, style, timing, view3d};
+use crate::{Model, ViewError, console, gallery, recent, style, view3d};
 
 /// Input for a window on `device`, its interface `zoom` times as large as usual. The textures of an
 /// earlier interface are lost with its device: this one sends them again.
@@ -54,51 +55,57 @@ impl Open {
             model.await_replay(StoredTrajectory::loaded(track, inputs::name(&file)), now);
         }
         plan.scene = scene;
-        let machine = sim::machine(&device);
         let keeper = Keeper::new();
         let (link, bell) = (plan.link.clone(), Bell::new(plan.proxy.clone()));
         let inputs = Inputs::new(link, bell, plan.scene.tracker.clone(), plan.options.listen)?;
         if let Some(address) = inputs.address() {
             output::line(format!("listening at {address} (OpenIGTLink)"));
         }
+        let mut open = OpenPanels::default();
+        for panel in [&console::ROW, &view3d::ROW] {
+            open.set(panel, true);
+        }
+        open.set(&gallery::ROW, plan.options.gallery);
         let state = State {
-            console: true,
+            panels: Panels {
+                console: Default::default(),
+                view3d: Default::default(),
+                timing: Default::default(),
+                help: Help,
+                gallery: Default::default(),
+                lesson: Lesson::new(Arc::new(session::waker(plan.proxy.clone()))),
+                planes: Default::default(),
+                mmode: Default::default(),
+                exam: Default::default(),
+            },
+            common: Common {
+                open,
+                tools: plan.tools(&device),
+                files: Files::default(),
+                inputs,
+                device: DeviceFacts {
+                    name: format!("{} ({})", device.name(), device.driver()),
+                    machine: sim::machine(&device),
+                    ray_query: device.supports_ray_query(),
+                    heap: device.info().memory_bytes,
+                },
+                warnings: plan.options.warnings.clone(),
+                warned: false,
+                asks: Vec::new(),
+            },
             framing: Default::default(),
             dual: Default::default(),
-            timing: false,
-            view3d: view3d::State::default(),
             share: view3d::USUAL,
-            planes: planes::State::default(),
-            times: timing::Page::default(),
-            help: false,
-            exam: Examination::default(),
-            gallery: Gallery::new(plan.options.gallery),
-            lesson: Lesson::new(Arc::new(session::waker(plan.proxy.clone()))),
-            mmode: Default::default(),
-            poses: Default::default(),
-            tissue: 0,
-            mesh: 0,
-            machine,
-            files: Files::default(),
-            ray_query: device.supports_ray_query(),
-            heap: device.info().memory_bytes,
-            device: format!("{} ({})", device.name(), device.driver()),
+            naming: Default::default(),
             problem: None,
             deaths: plan.deaths.clone(),
             stopped: false,
             restart: false,
             preparing: "Opening the device",
-            tools: plan.tools(&device),
-            inputs,
             leaving: None,
             offer: keeper.orphan(&plan.options.file),
             taken_up: None,
             stale: None,
-            asked: None,
-            answer: None,
-            wanted: None,
-            warnings: plan.options.warnings.clone(),
-            warned: false,
             keeper,
             quit: false,
         };
@@ -134,15 +141,14 @@ impl Open {
             ..
         } = self;
         // A scene handed over is lost with the device; the user can open it again.
-        state.files.opening = opening.is_some();
+        state.common.files.opening = opening.is_some();
         // Everything on the lost device is dropped before there is another.
         drop((frame, pictured));
-        state.tools.lose();
+        state.common.tools.lose();
         state.dual.end();
         drop(session);
         let device = session::device(&plan.options, &window)?;
-        // Its texture is lost with the device.
-        state.mmode = Default::default();
+        state.panels.all().into_iter().for_each(Panel::lose);
         state.problem = problem;
         (state.stopped, state.restart) = (false, false);
         let input = interface(&window, input.egui_ctx().zoom_factor(), &device);

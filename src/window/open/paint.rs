@@ -3,14 +3,15 @@
 use std::time::{Duration, Instant};
 
 use super::{Open, gestures};
-use crate::bmode::Place;
-use crate::engine::Frame;
 use crate::gpu::{GpuError, InterfaceFrame, Painted, PlacedImage, Screenshot};
 use crate::layout::{self, Places};
+use crate::panel::Seen;
+use crate::picture::Frame;
+use crate::place::Place;
 use crate::statistics::{Sample, Times};
 use crate::timing::costs;
 use crate::tools::cropped;
-use crate::{keys, mmode, real};
+use crate::{acts, mmode, real};
 
 /// Number of images of an animation after which a screenshot is taken.
 const SETTLED: usize = 24;
@@ -31,10 +32,10 @@ impl Open {
         let mut output = egui::FullOutput::default();
         for input in gestures::passes(input) {
             output.append(context.run_ui(input, |ui| {
-                keys::apply(ui.ctx(), model, state, touched);
-                shown = state.tools.shown(model, ui.ctx());
-                let pictures = (shown.as_ref(), pictured);
-                places = layout::show(ui, model, state, times, pictures, touched);
+                acts::apply(ui.ctx(), model, state, touched);
+                shown = state.common.tools.shown(model, ui.ctx());
+                let seen = Seen { times, frame: shown.as_ref(), pictured, now: touched };
+                places = layout::show(ui, model, state, seen);
                 model.note_marks(touched);
             }));
         }
@@ -83,8 +84,9 @@ impl Open {
         };
         let size = [size.width, size.height];
         let painter = &mut self.session.painter;
-        let tools = &mut self.state.tools;
-        let wanted = tools.wants_shot(&self.model, &self.state.dual) && painter.can_be_read();
+        let tools = &mut self.state.common.tools;
+        let wanted =
+            tools.wants_shot(&self.model, self.state.dual.is_on()) && painter.can_be_read();
         let marked = wanted && tools.cleared;
         let painted = painter.paint(size, &placed, interface, shot || marked)?;
         self.session.engine.drawn();
@@ -97,8 +99,8 @@ impl Open {
             let r = both * scale;
             cropped(picture, [r.left(), r.top(), r.right(), r.bottom()])
         });
-        let strip = || mmode::saved(&self.model, &self.state.mmode);
-        let study = || self.state.exam.study(self.model.settings.imaging.exam);
+        let strip = || mmode::saved(&self.model, &self.state.panels.mmode);
+        let study = || self.state.panels.exam.study(self.model.settings.imaging.exam);
         // Asked for while it was drawn: the next drawing is the one without buttons.
         match wanted && !marked {
             true => context.request_repaint(),
@@ -117,7 +119,7 @@ impl Open {
 
     /// Sends the view of the anatomy to the simulation.
     fn point(&mut self, places: &Places, scale: f32) {
-        let (model, state) = (&self.model, &self.state.view3d);
+        let (model, state) = (&self.model, &self.state.panels.view3d);
         let look = (places.view3d).map(|place| place.look(model, state, scale));
         if look != self.look {
             if look.is_none() {

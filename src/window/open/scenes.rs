@@ -5,10 +5,13 @@ use std::time::Instant;
 
 use super::{Open, Plan};
 use crate::inputs::name;
-use crate::leaving::{self, Way};
+use crate::leaving;
 use crate::naming;
 use crate::opening::{Opened, Opening, Purpose};
+use crate::panel::Panel;
+use crate::planes;
 use crate::recent;
+use crate::way::Way;
 
 /// Reason for which no scene is opened.
 const STOPPED: &str = "The simulation stands still. Start it again first, then open the scene.";
@@ -18,8 +21,8 @@ impl Open {
     /// scene again whose files have changed.
     pub(crate) fn begin(&mut self, plan: &Plan) {
         let model = &self.model;
-        if let Some(asked) = self.state.asked.take() {
-            self.state.answer = naming::answer(&plan.scene, model, asked);
+        if let Some(asked) = self.state.naming.asked.take() {
+            self.state.naming.answer = naming::answer(&plan.scene, model, asked);
             self.window.request_redraw();
         }
         if std::mem::replace(&mut self.saved, model.saves()) != model.saves() {
@@ -31,14 +34,14 @@ impl Open {
             Some(Opening::begin(path, overrides, purpose, plan.proxy.clone()))
         };
         let own = || model.file.overrides.clone();
-        if let Some(path) = self.state.files.wanted.take() {
+        if let Some(path) = self.state.common.files.wanted.take() {
             if self.state.stopped {
                 return self.refuse(STOPPED.to_owned());
             }
             // Overrides belong to this file, not to another one.
             let overrides = if path == model.file.path { own() } else { Vec::new() };
             self.watch.set(&path);
-            self.state.files.opening = true;
+            self.state.common.files.opening = true;
             self.opening = begin(path, overrides, Purpose::Open);
         } else if self.opening.is_some() || self.coming.is_some() || self.state.stopped {
             // What has changed is read afterwards.
@@ -92,15 +95,17 @@ impl Open {
             opened.expect("nothing else was handed over");
         // Of the same session, what has happened meanwhile is still to be told.
         self.told = if again { u64::MAX } else { model.revision() };
-        self.state.warnings = warnings;
+        self.state.common.warnings = warnings;
         // Indices of the scene before.
-        (self.state.tissue, self.state.mesh, self.state.answer) = (0, 0, None);
+        self.state.panels.console.forget_indices();
+        self.state.naming.answer = None;
         self.state.stale = None;
-        self.state.inputs.calibrate(scene.tracker.clone());
+        self.state.common.inputs.calibrate(scene.tracker.clone());
         if again {
             model.succeed(&mut self.model);
             self.model = model;
             self.state
+                .common
                 .tools
                 .notices
                 .tell(format!("{} was read again", name(&self.model.file.path)));
@@ -118,14 +123,12 @@ impl Open {
         // The last frame shows the scene before, as do all measurements on it.
         self.frame = None;
         (self.pictured, self.look) = (None, None);
-        self.state.tools.lose();
+        self.state.common.tools.lose();
         self.state.dual.end();
-        self.state.mmode = Default::default();
-        self.state.poses = Default::default();
-        self.state.lesson.leave();
-        self.state.planes = Default::default();
-        self.state.files.opening = false;
-        self.state.files.close();
+        self.state.panels.all().into_iter().for_each(Panel::leave);
+        self.state.common.open.set(&planes::ROW, false);
+        self.state.common.files.opening = false;
+        self.state.common.files.close();
         self.state.offer = self.state.keeper.orphan(&self.model.file.path);
     }
 
@@ -152,8 +155,8 @@ impl Open {
             return;
         }
         self.watch.set(&self.model.file.path);
-        self.state.files.opening = false;
-        if let Err(problem) = self.state.files.refuse(problem) {
+        self.state.common.files.opening = false;
+        if let Err(problem) = self.state.common.files.refuse(problem) {
             self.state.problem = Some(problem);
         }
     }

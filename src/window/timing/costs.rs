@@ -2,8 +2,8 @@
 
 use egui::{ScrollArea, Ui};
 
-use super::super::engine::Frame;
 use super::super::model::Model;
+use super::super::picture::Frame;
 use super::super::statistics::Times;
 use super::{HEIGHT, pair};
 use crate::scene::Strategy;
@@ -24,7 +24,7 @@ pub(crate) fn strategies(all: &[Option<Strategy>]) -> String {
 
 /// Draws the costs by strategy, as far as the last frames have used several, and the meshes that change.
 pub(super) fn structures(ui: &mut Ui, times: &Times, model: &Model) {
-    let scroll = ScrollArea::vertical().max_height(HEIGHT - 48.0);
+    let scroll = ScrollArea::vertical().max_height(HEIGHT - 54.0);
     scroll.auto_shrink([true, false]).show(ui, |ui| {
         let mut seen: Vec<&str> = times.samples().map(|s| s.strategy.as_str()).collect();
         seen.dedup();

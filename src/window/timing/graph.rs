@@ -16,7 +16,7 @@ const WIDTHS: [f32; 2] = [200.0, 480.0];
 /// Draws bars from the left, oldest first: stages from below, then the rest of the frame beside the device;
 /// the line is at 1/30 s.
 pub(super) fn show(ui: &mut Ui, times: &Times) {
-    let size = vec2(ui.available_width().clamp(WIDTHS[0], WIDTHS[1]), HEIGHT - 52.0);
+    let size = vec2(ui.available_width().clamp(WIDTHS[0], WIDTHS[1]), HEIGHT - 58.0);
     let (area, response) = ui.allocate_exact_size(size, Sense::hover());
     let painter = ui.painter_at(area);
     painter.rect_filled(area, 2.0, style::BACK);

@@ -3,8 +3,8 @@
 use std::time::{Duration, Instant};
 
 use super::{Taken, Worker};
-use crate::engine::Film;
 use crate::model::mmode::{Aim, Column, RATE, ROWS};
+use crate::picture::Film;
 use crate::sim::{SimError, Simulator, Tracer, image_size, machine};
 
 /// Longest time before a picture of which columns are made; after a rest the strip goes on with a gap.

@@ -5,12 +5,13 @@ use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 use super::{Imaged, Taken, Worker};
-use crate::engine::{Film, Frame, News, Pixels, Sector};
+use crate::engine::News;
 use crate::gpu::Abandon;
 use crate::look::Pictured;
 use crate::model::{Order, Settings};
+use crate::picture::{Film, Frame, Pixels, Sector};
 use crate::scene::Scene;
-use crate::sim::{SimError, Simulator, Tracer, image_size};
+use crate::sim::{Outputs, Shot, SimError, Simulator, Tracer, image_size};
 
 /// Share of the image in the budget while the 3D view is open.
 const IMAGE_SHARE: f64 = 0.8;
@@ -140,24 +141,22 @@ impl Worker {
         simulator.abandon_when(at_rest.then(|| self.newer()));
         let scene = &self.scene;
         let image = self.ring.free(image_size(scene))?;
-        simulator.show_on(Some(image.clone()));
         let tinted = match order.tint.filter(|_| scene.shows_volume()) {
             Some(tint) => Some((self.ring.free(image_size(scene))?, tint)),
             None => None,
         };
-        simulator.tint_on(tinted.clone());
         let painted = match order.paint {
             Some(opacity) => Some((self.ring.free(image_size(scene))?, opacity)),
             None => None,
         };
-        simulator.paint_on(painted.clone());
         // The scene's own picture is the one of `render`, with the noise of its first frame.
         let index = if level == 0 && at_rest { 0 } else { taken.index };
-        let submitted = simulator.frame(scene, index);
-        simulator.show_on(None);
-        simulator.tint_on(None);
-        simulator.paint_on(None);
-        submitted?;
+        let outputs = Outputs {
+            shown: Some(&image),
+            tinted: tinted.as_ref().map(|(image, tint)| (image, *tint)),
+            painted: painted.as_ref().map(|(image, opacity)| (image, *opacity)),
+        };
+        simulator.frames_into(scene, &[Shot::of(scene, index)], &outputs)?;
         let timings = simulator.wait()?.pop().unwrap_or_default();
         let wall = began.elapsed();
         // The very first frame includes kernels that the driver compiles late.
