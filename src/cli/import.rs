@@ -219,6 +219,12 @@ fn report(draft: &Draft) {
             part.name, part.tissue, part.triangles, part.volume
         ));
     }
+    for structure in &draft.left_out {
+        output::line(format!("left out: {structure}, which no scene takes"));
+    }
+    for remark in &draft.remarks {
+        output::line(format!("note: {remark}"));
+    }
     let all: usize = draft.parts.iter().map(|p| p.triangles).sum();
     output::line(format!("{} meshes, {all} triangles", draft.parts.len()));
     let unknown: Vec<_> =

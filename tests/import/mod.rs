@@ -9,6 +9,7 @@ mod dicom;
 mod folders;
 mod label_maps;
 mod plus;
+mod segments;
 
 /// A mesh as the text of an OBJ file, moved.
 fn obj(mesh: &Mesh, shift: DVec3) -> String {

@@ -56,6 +56,8 @@ pub struct Draft {
     pub parts: Vec<Part>,
     /// Structures that are no mesh of the scene, and why.
     pub left_out: Vec<String>,
+    /// What is to be known of structures, in words: what they lose to others that they overlap, and the like.
+    pub remarks: Vec<String>,
     /// Tissue and origin of the skin, in words.
     pub skin: Option<String>,
     /// Place of the probe, and the name of the organ that it looks at.
@@ -81,6 +83,7 @@ impl Draft {
             frame: String::new(),
             parts: Vec::new(),
             left_out: Vec::new(),
+            remarks: Vec::new(),
             skin: None,
             view: None,
         })
@@ -207,6 +210,9 @@ impl Draft {
         let mut out = String::new();
         for structure in &self.left_out {
             out += &format!("# Left out: {structure}, which no scene takes.\n");
+        }
+        for remark in &self.remarks {
+            out += &format!("# {remark}.\n");
         }
         out += "# In rising priority: where two lie on or in each other, the later one wins.\n";
         for part in &self.parts {

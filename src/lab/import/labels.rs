@@ -3,26 +3,45 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use glam::DAffine3;
+
 use super::grid::Grid;
-use super::names::{self, Segment};
+use super::names::{self, Described, Segment};
 use crate::issue::FileError;
 use crate::volume::{DicomSegment, Segmentation, Summary, Volume, Voxels};
 
 /// A label map and what its labels are.
 #[derive(Clone, Debug)]
 pub struct LabelMap {
-    /// The voxels; label n is `labels[n - 1]`.
-    pub grid: Grid,
+    /// Voxels along each axis, all at least 1.
+    pub size: [usize; 3],
+    /// Voxel indices (integers at centres) to LPS, mm.
+    pub world_from_voxel: DAffine3,
+    /// Layers of voxels, first axis fastest, at least one: labels of one layer do not overlap. 0 is none; label n is
+    /// `labels[n - 1]`.
+    pub layers: Vec<Vec<u8>>,
     /// The labels.
     pub labels: Vec<Segment>,
+    /// What is to be known of them, in words.
+    pub remarks: Vec<String>,
+}
+
+/// What another label has of a label that it overlaps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Covered {
+    /// The label that loses: its place in the list.
+    pub label: usize,
+    /// The one that takes most of that.
+    pub by: usize,
+    /// Share of its voxels that it loses to all others, 0 to 1.
+    pub share: f64,
 }
 
 /// Largest value of a label.
 const MAX_VALUE: f64 = 16_777_216.0;
 
 impl LabelMap {
-    /// Reads a label map: a volume of which every voxel is an integer, 0 for none; of several layers of segments the
-    /// later segment covers the earlier.
+    /// Reads a label map: a volume of which every voxel is an integer, 0 for none, or several such layers of segments.
     ///
     /// # Errors
     /// A file that is no volume; values that are no labels, or too many.
@@ -40,7 +59,7 @@ impl LabelMap {
             return Err(FileError::file(path, message, remedy));
         }
         let (volume, _) = Volume::load(path)?;
-        let segments = names::of(path)?;
+        let Described { segments, mut remarks } = names::of(path)?;
         let layered = segments.iter().any(|s| s.layer > 0);
         if !volume.later.is_empty() && !layered {
             let count = volume.later.len() + 1;
@@ -51,39 +70,82 @@ impl LabelMap {
             ));
         }
         let Volume { size, world_from_voxel, voxels, later, .. } = volume;
-        let mut labels = Vec::new();
-        let mut grid: Option<Grid> = None;
+        let (mut labels, mut layers) = (Vec::new(), Vec::new());
         for (layer, voxels) in std::iter::once(voxels).chain(later).enumerate() {
             let (voxels, values) = number(path, voxels, labels.len())?;
             labels.extend(values.into_iter().map(|value| segment(&segments, layer, value)));
-            match &mut grid {
-                None => grid = Some(Grid { size, world_from_voxel, voxels }),
-                Some(grid) => {
-                    for (below, above) in grid.voxels.iter_mut().zip(voxels) {
-                        if above > 0 {
-                            *below = above;
-                        }
-                    }
-                }
-            }
+            layers.push(voxels);
         }
         if labels.is_empty() {
             let message = "every voxel is 0: no structure is labelled";
             return Err(FileError::file(path, message, "give the segmentation"));
         }
-        Ok(Self { grid: grid.expect("a volume"), labels })
+        for own in &segments {
+            if !labels.iter().any(|label| (label.layer, label.value) == (own.layer, own.value)) {
+                remarks.push(empty(own));
+            }
+        }
+        Ok(Self { size, world_from_voxel, layers, labels, remarks })
+    }
+
+    /// One layer: where labels overlap, the one of the highest priority, of equals the one of fewest voxels, so that what
+    /// is small stays whole. Also returns what each loses by that.
+    pub fn merged(self, priorities: &[i32]) -> (Grid, Vec<Covered>) {
+        let Self { size, world_from_voxel, mut layers, labels, .. } = self;
+        let mut counts = vec![0u64; labels.len() + 1];
+        for &label in layers.iter().flatten() {
+            counts[usize::from(label)] += 1;
+        }
+        let rank = |label: u8| match usize::from(label) {
+            0 => None,
+            n => Some((priorities[n - 1], u64::MAX - counts[n], n)),
+        };
+        let mut lost = vec![vec![0u64; labels.len() + 1]; labels.len() + 1];
+        let mut voxels = layers.remove(0);
+        for layer in layers {
+            for (below, above) in voxels.iter_mut().zip(layer) {
+                let (winner, loser) = match rank(above) > rank(*below) {
+                    true => (above, *below),
+                    false => (*below, above),
+                };
+                lost[usize::from(loser)][usize::from(winner)] += 1;
+                *below = winner;
+            }
+        }
+        let covered = (1..=labels.len()).filter_map(|n| {
+            let (by, _) = lost[n].iter().enumerate().max_by_key(|(_, count)| **count)?;
+            let sum: u64 = lost[n].iter().sum();
+            let share = sum as f64 / counts[n] as f64;
+            (sum > 0).then(|| Covered { label: n - 1, by: by - 1, share })
+        });
+        (Grid { size, world_from_voxel, voxels }, covered.collect())
     }
 }
 
 fn of_dicom(path: &Path, found: Segmentation) -> Result<LabelMap, FileError> {
-    if found.voxels.iter().all(|v| *v == 0) {
+    if found.layers.iter().flatten().all(|v| *v == 0) {
         let message = "none of its segments has a pixel";
         return Err(FileError::file(path, message, "give the segmentation"));
     }
     let segment = |s: DicomSegment| Segment { layer: 0, value: s.number.into(), names: s.names };
-    let Segmentation { size, world_from_voxel, voxels, segments } = found;
-    let grid = Grid { size, world_from_voxel, voxels };
-    Ok(LabelMap { grid, labels: segments.into_iter().map(segment).collect() })
+    let Segmentation { size, world_from_voxel, layers, segments } = found;
+    let labels: Vec<Segment> = segments.into_iter().map(segment).collect();
+    let mut there = [false; 256];
+    for &label in layers.iter().flatten() {
+        there[usize::from(label)] = true;
+    }
+    let missing = (1..).zip(&labels).filter(|(n, _): &(usize, _)| !there[*n]);
+    // What others leave around the segments may be described as one.
+    let missing = missing.filter(|(_, label)| label.value > 0);
+    let remarks = missing.map(|(_, label)| empty(label)).collect();
+    Ok(LabelMap { size, world_from_voxel, layers, labels, remarks })
+}
+
+/// The remark on a segment without a voxel.
+fn empty(segment: &Segment) -> String {
+    let name =
+        segment.names.first().map_or_else(|| format!("label {}", segment.value), Clone::clone);
+    format!("{name}: has no voxel, and is no mesh")
 }
 
 /// The segment of a value in a layer; without a name where the file has none.

@@ -6,7 +6,7 @@ use glam::{DAffine3, DVec3};
 
 use super::draft::{Draft, Part, SKIN};
 use super::grid::Grid;
-use super::labels::LabelMap;
+use super::labels::{Covered, LabelMap};
 use super::pose::{self, Task};
 use super::surface::Surfaces;
 use super::table::{Entry, OUTLINE};
@@ -39,10 +39,8 @@ pub fn import(
     progress: Progress,
 ) -> Result<Draft, FileError> {
     progress("read", 0, 1);
-    let LabelMap { mut grid, labels } = LabelMap::load(path)?;
-    if let Some(spacing) = options.spacing {
-        grid = resampled(path, &grid, spacing)?;
-    }
+    let map = LabelMap::load(path)?;
+    let (labels, remarks) = (map.labels.clone(), map.remarks.clone());
     let mut entries: Vec<Entry> = Vec::new();
     for segment in &labels {
         let names: Vec<_> = segment.names.iter().map(String::as_str).collect();
@@ -51,6 +49,11 @@ pub fn import(
             entry.name = format!("label {}", segment.value);
         }
         entries.push(entry);
+    }
+    let priorities: Vec<i32> = entries.iter().map(|entry| entry.priority).collect();
+    let (mut grid, covered) = map.merged(&priorities);
+    if let Some(spacing) = options.spacing {
+        grid = resampled(path, &grid, spacing)?;
     }
     let outline = join_outlines(&mut grid, &entries);
     let volumes = grid.counts();
@@ -75,6 +78,10 @@ pub fn import(
     });
     let mut surfaces = Surfaces::new(&grid, &net);
     let mut draft = Draft::begin(folder, path, options.force)?;
+    draft.remarks = remarks;
+    // The skin is around all of them.
+    let organs = covered.iter().filter(|found| entries[found.label].priority != OUTLINE);
+    draft.remarks.extend(organs.map(|found| overlap(found, &entries)));
     let mut target = None;
     for (n, (entry, segment)) in entries.iter().zip(&labels).enumerate() {
         let label = n as u8 + 1;
@@ -124,6 +131,21 @@ pub fn import(
     }
     draft.rank();
     Ok(draft)
+}
+
+/// What a structure loses to those that it overlaps, in words.
+fn overlap(found: &Covered, entries: &[Entry]) -> String {
+    let Covered { label, by, share } = *found;
+    let [own, other] = [label, by].map(|n| entries[n].name.as_str());
+    match share {
+        1.0 => format!("{own}: all of it overlaps others, {other} above all: it is no mesh"),
+        share => {
+            format!(
+                "{own}: {:.1} % of it overlaps others, {other} above all, and is theirs",
+                100.0 * share
+            )
+        }
+    }
 }
 
 /// A part as the table has it.

@@ -23,25 +23,59 @@ const MAX_HEAD: u64 = 8 << 20;
 /// Bytes of a NIfTI-1 header.
 const NIFTI: usize = 348;
 
-/// The segments that a file describes; none where its format or writer has no words for them. What is malformed
-/// there is passed over: the voxels are the segmentation.
+/// What a file says of its segments.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Described {
+    /// The segments; none where the file's format or writer has no words for them.
+    pub segments: Vec<Segment>,
+    /// What of that cannot be used, in words.
+    pub remarks: Vec<String>,
+}
+
+impl Described {
+    /// Notes segments that share a value in a layer: they are one structure, which has the first one's names.
+    fn unite(mut self) -> Self {
+        let mut kept: Vec<Segment> = Vec::new();
+        for segment in self.segments {
+            let same = |s: &&Segment| (s.layer, s.value) == (segment.layer, segment.value);
+            match kept.iter().find(same) {
+                Some(first) => {
+                    let [first, second] =
+                        [first, &segment].map(|s| s.names.first().map_or("", |n| n));
+                    self.remarks.push(format!(
+                        "`{second}`: has the value {} of `{first}`, in the same layer: both are one mesh, `{first}`",
+                        segment.value
+                    ));
+                }
+                None => kept.push(segment),
+            }
+        }
+        Self { segments: kept, ..self }
+    }
+}
+
+/// What a file says of its segments. What is malformed there is passed over: the voxels are the segmentation.
 ///
 /// # Errors
 /// A file that cannot be read.
-pub fn of(path: &Path) -> Result<Vec<Segment>, FileError> {
+pub fn of(path: &Path) -> Result<Described, FileError> {
     let name = path.to_string_lossy().to_ascii_lowercase();
     let fail =
         |e: std::io::Error| FileError::file(path, format!("cannot be read: {e}"), "check the path");
     let open = || std::fs::File::open(path).map_err(fail);
     if name.ends_with(".nrrd") || name.ends_with(".nhdr") {
-        Ok(of_nrrd(&head(open()?)))
+        Ok(of_nrrd(&head(open()?)).unite())
     } else if name.ends_with(".nii.gz") {
-        Ok(of_nifti(&head(MultiGzDecoder::new(open()?))))
+        Ok(plain(of_nifti(&head(MultiGzDecoder::new(open()?)))))
     } else if name.ends_with(".nii") {
-        Ok(of_nifti(&head(open()?)))
+        Ok(plain(of_nifti(&head(open()?))))
     } else {
-        Ok(Vec::new())
+        Ok(Described::default())
     }
+}
+
+fn plain(segments: Vec<Segment>) -> Described {
+    Described { segments, remarks: Vec::new() }.unite()
 }
 
 /// The first bytes of a stream. What follows a fault is missing; the reader of the voxels names it.
@@ -52,9 +86,11 @@ fn head(stream: impl Read) -> Vec<u8> {
 }
 
 /// `SegmentN_Name` and the like, as 3D Slicer writes them
-/// (slicer.readthedocs.io, "Segmentation file format").
-fn of_nrrd(bytes: &[u8]) -> Vec<Segment> {
-    let mut found: std::collections::BTreeMap<u32, Segment> = Default::default();
+/// (slicer.readthedocs.io, "Segmentation file format"). Versions before 4.11 gave each segment a layer of its own and no
+/// values: there its voxels are 1.
+fn of_nrrd(bytes: &[u8]) -> Described {
+    let mut found: std::collections::BTreeMap<usize, (Segment, Option<String>, Option<usize>)> =
+        Default::default();
     let lines = bytes.split(|&b| b == b'\n').map(|l| String::from_utf8_lossy(l).into_owned());
     for line in lines.take_while(|l| !l.trim_end().is_empty()) {
         let Some((key, value)) = line.trim_end().split_once(":=") else { continue };
@@ -63,11 +99,11 @@ fn of_nrrd(bytes: &[u8]) -> Vec<Segment> {
             continue;
         };
         let Ok(number) = number.parse() else { continue };
-        let segment = found.entry(number).or_default();
+        let (segment, stated, layer) = found.entry(number).or_default();
         match field {
             "Name" => segment.names.insert(0, value.to_owned()),
-            "LabelValue" => segment.value = value.parse().unwrap_or(0),
-            "Layer" => segment.layer = value.parse().unwrap_or(0),
+            "LabelValue" => *stated = Some(value.to_owned()),
+            "Layer" => *layer = value.parse().ok(),
             "Tags" => {
                 let entry = value.split('|').find_map(|tag| tag.strip_prefix("TerminologyEntry:"));
                 segment.names.extend(entry.into_iter().flat_map(terms));
@@ -75,7 +111,27 @@ fn of_nrrd(bytes: &[u8]) -> Vec<Segment> {
             _ => {}
         }
     }
-    found.into_values().filter(|s| s.value > 0).collect()
+    let is_old = found.values().all(|(_, stated, _)| stated.is_none());
+    let mut out = Described::default();
+    for (number, (segment, stated, layer)) in found {
+        let usual = if is_old { number } else { 0 };
+        let layer = layer.unwrap_or(usual);
+        let value = match &stated {
+            None => Some(1),
+            Some(text) => text.parse().ok().filter(|value| *value > 0),
+        };
+        match value {
+            Some(value) => out.segments.push(Segment { layer, value, ..segment }),
+            None => {
+                let name = segment.names.first().map_or("", |name| name.as_str());
+                let text = stated.unwrap_or_default();
+                out.remarks.push(format!(
+                    "`{name}`: its value, {text}, is that of no voxel: a structure without a name may be it"
+                ));
+            }
+        }
+    }
+    out
 }
 
 /// Meanings in a terminology entry, the most telling first: `context~category~type~modifier~region context~region~
@@ -125,10 +181,29 @@ mod tests {
             Segment0_Tags:=Segmentation.Status:inprogress|TerminologyEntry:Segmentation category and type\
             ~SCT^123037004^Anatomical Structure~SCT^10200004^Liver~SCT^7771000^Left~Anatomic codes~SCT^1^Abdomen~^^|\n\
             Segment0_Name:=big one\nSegment1_LabelValue:=2\nSegmentation_MasterRepresentation:=x\n\nSegment2_LabelValue:=9\n";
-        let found = of_nrrd(text.as_bytes());
+        let Described { segments: found, remarks } = of_nrrd(text.as_bytes());
+        assert!(remarks.is_empty(), "{remarks:?}");
         let names = ["big one", "Liver", "Abdomen", "Anatomical Structure"].map(str::to_owned);
         let first = Segment { layer: 1, value: 3, names: names.to_vec() };
         assert_eq!(found, [first, Segment { value: 2, ..Segment::default() }]);
+    }
+
+    #[test]
+    fn segments_without_values_have_a_layer_each_and_bad_values_are_told() {
+        let old = "Segment0_Name:=liver\nSegment1_Name:=aorta\nSegment1_Extent:=0 1 0 1 0 1\n";
+        let found = of_nrrd(old.as_bytes()).segments;
+        let places: Vec<_> =
+            found.iter().map(|s| (s.layer, s.value, s.names[0].as_str())).collect();
+        assert_eq!(places, [(0, 1, "liver"), (1, 1, "aorta")]);
+        let bad = "Segment0_Name:=a\nSegment0_LabelValue:=-1\nSegment1_Name:=b\nSegment1_LabelValue:=2\n\
+            Segment2_Name:=c\nSegment2_LabelValue:=2\nSegment3_Name:=d\n\
+            Segment3_LabelValue:=99999999999999999999\n";
+        let found = of_nrrd(bad.as_bytes()).unite();
+        assert_eq!(found.segments.len(), 1);
+        let remarks = found.remarks.join("\n");
+        for part in ["`a`: its value, -1", "`d`: its value, 9999", "`c`: has the value 2 of `b`"] {
+            assert!(remarks.contains(part), "{part}: {remarks}");
+        }
     }
 
     #[test]

@@ -40,7 +40,7 @@ const SEQUENCES: [Tag; 12] = [
 pub(super) const PIXELS: Tag = (0x7fe0, 0x0010);
 pub(super) const FLOAT_PIXELS: Tag = (0x7fe0, 0x0008);
 /// Groups and elements of values that are kept.
-const KEPT: [Tag; 28] = [
+const KEPT: [Tag; 30] = [
     (0x0002, 0x0010),
     (0x0008, 0x0016),
     (0x0008, 0x0060),
@@ -64,9 +64,11 @@ const KEPT: [Tag; 28] = [
     (0x0028, 0x0103),
     (0x0028, 0x1052),
     (0x0028, 0x1053),
+    (0x0062, 0x0001),
     (0x0062, 0x0004),
     (0x0062, 0x0005),
     (0x0062, 0x000b),
+    (0x0062, 0x000e),
     PIXELS,
     FLOAT_PIXELS,
 ];

@@ -1,4 +1,5 @@
-//! DICOM segmentations (PS3.3, A.51): frames of one segment each, of one bit a pixel or of shares.
+//! DICOM segmentations: frames of one segment each, of one bit a pixel or of shares (PS3.3, A.51), and label maps,
+//! whose pixels are the numbers of segments (PS3.3, A.90).
 
 use std::path::Path;
 
@@ -11,7 +12,11 @@ use crate::issue::FileError;
 use crate::volume::grid::{Frame, Grid};
 
 /// Segmentation Storage.
-const CLASS: &str = "1.2.840.10008.5.1.4.1.1.66.4";
+const SEGMENTS: &str = "1.2.840.10008.5.1.4.1.1.66.4";
+/// Label Map Segmentation Storage.
+const LABEL_MAP: &str = "1.2.840.10008.5.1.4.1.1.66.7";
+/// Pixels of 255 are whole ones where a file of shares does not say what is.
+const WHOLE: u16 = 255;
 /// Largest deviation of a plane from its place, as a part of the distance between planes.
 const UNEVEN: f64 = 0.01;
 /// Most segments: each has a value of eight bits.
@@ -26,15 +31,15 @@ pub struct DicomSegment {
     pub names: Vec<String>,
 }
 
-/// Segments as voxels; where two overlap the later one.
+/// Segments as voxels. Segments that overlap lie in different layers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Segmentation {
     /// Voxels along each axis.
     pub size: [usize; 3],
     /// Voxel indices (integers at centres) to LPS, mm.
     pub world_from_voxel: DAffine3,
-    /// 0, or 1 and the place of the segment in `segments`; first axis fastest.
-    pub voxels: Vec<u8>,
+    /// Layers of voxels: 0, or 1 and the place of the segment in `segments`; first axis fastest.
+    pub layers: Vec<Vec<u8>>,
     /// The segments.
     pub segments: Vec<DicomSegment>,
 }
@@ -48,9 +53,11 @@ impl Segmentation {
         let dicom = file::read(path)?;
         let elements = dicom.elements();
         let class = elements.text(&dicom.root, (0x0008, 0x0016));
-        if class.as_deref() != Some(CLASS) {
-            return Ok(None);
-        }
+        let kind = match class.as_deref() {
+            Some(SEGMENTS) => Kind::of(&dicom)?,
+            Some(LABEL_MAP) => Kind::LabelMap,
+            _ => return Ok(None),
+        };
         let segments = segments(&dicom)?;
         let number = |element: u16, name: &str| {
             let tag = (0x0028, element);
@@ -59,8 +66,9 @@ impl Segmentation {
         };
         let (rows, columns) = (number(0x0010, "Rows")?, number(0x0011, "Columns")?);
         let bits = number(0x0100, "BitsAllocated")?;
-        if bits != 1 && bits != 8 {
-            return Err(dicom.error(format!("pixels of {bits} bits are no segmentation"), SAVE));
+        if !kind.has_bits(bits) {
+            let message = format!("pixels of {bits} bits are none of a segmentation of this kind");
+            return Err(dicom.error(message, SAVE));
         }
         let Some(Value::Items(frames)) = dicom.root.get(&elements::PER_FRAME) else {
             let tag = elements::PER_FRAME;
@@ -99,28 +107,153 @@ impl Segmentation {
         let world_from_voxel = grid.world_from_voxel().map_err(|cause| {
             dicom.error(cause, "correct the orientation or the positions of the planes")
         })?;
-        let mut voxels = vec![0u8; size.iter().product()];
-        // In the order of segments, so that the later covers the earlier.
-        let mut order = Vec::new();
-        for (n, frame) in frames.iter().enumerate() {
-            order.push((segment_of(&dicom, frame, &segments)?, n));
-        }
-        order.sort_unstable();
-        for (segment, n) in order {
-            let slice = ((heights[n] - first_height) / step).round() as usize;
-            let plane = &mut voxels[slice * rows * columns..][..rows * columns];
-            let start = n * rows * columns;
-            for (at, voxel) in plane.iter_mut().enumerate() {
-                let on = match bits {
-                    1 => pixels[(start + at) / 8] >> ((start + at) % 8) & 1 == 1,
-                    _ => pixels[start + at] >= 128,
-                };
-                if on {
-                    *voxel = segment as u8 + 1;
+        let at = Frames {
+            pixels,
+            area: rows * columns,
+            slices: heights.iter().map(|h| ((h - first_height) / step).round() as usize).collect(),
+            bits,
+            big: dicom.elements().big,
+        };
+        let voxels = size.iter().product();
+        let layers = match kind {
+            Kind::LabelMap => vec![at.labels(&dicom, voxels, &segments)?],
+            Kind::Binary | Kind::Shares { .. } => {
+                let mut order = Vec::new();
+                for (n, frame) in frames.iter().enumerate() {
+                    order.push((segment_of(&dicom, frame, &segments)?, n));
                 }
+                order.sort_unstable();
+                at.layers(voxels, &order, kind.threshold(pixels, bits))
+            }
+        };
+        Ok(Some(Self { size, world_from_voxel, layers, segments }))
+    }
+}
+
+/// The kind of a segmentation.
+#[derive(Clone, Copy)]
+enum Kind {
+    /// A bit for each pixel; some writers take a byte.
+    Binary,
+    /// Shares of what `most` says is a whole pixel, where the file says it.
+    Shares { most: Option<u16> },
+    /// The numbers of segments.
+    LabelMap,
+}
+
+impl Kind {
+    fn of(dicom: &Dicom) -> Result<Self, FileError> {
+        let elements = dicom.elements();
+        let stated = elements.text(&dicom.root, (0x0062, 0x0001));
+        match stated.as_deref().unwrap_or("BINARY") {
+            "BINARY" => Ok(Self::Binary),
+            "FRACTIONAL" => {
+                let most = elements.number(&dicom.root, (0x0062, 0x000e)).filter(|most| *most > 0);
+                Ok(Self::Shares { most })
+            }
+            "LABELMAP" => Ok(Self::LabelMap),
+            other => {
+                let message = format!("is a segmentation of kind {other}, which cannot be read");
+                Err(dicom.error(message, "save it as BINARY, FRACTIONAL or LABELMAP"))
             }
         }
-        Ok(Some(Self { size, world_from_voxel, voxels, segments }))
+    }
+
+    fn has_bits(self, bits: usize) -> bool {
+        match self {
+            Self::Binary => bits == 1 || bits == 8,
+            Self::Shares { .. } => bits == 8,
+            Self::LabelMap => bits == 8 || bits == 16,
+        }
+    }
+
+    /// The least value of a pixel that belongs to its segment: half of a whole one.
+    fn threshold(self, pixels: &[u8], bits: usize) -> u16 {
+        let small = || bits == 1 || pixels.iter().all(|pixel| *pixel <= 1);
+        let whole = match self {
+            Self::Binary | Self::LabelMap => 1,
+            Self::Shares { most: Some(most) } => most,
+            Self::Shares { most: None } if small() => 1,
+            Self::Shares { most: None } => WHOLE,
+        };
+        whole.div_ceil(2)
+    }
+}
+
+/// The frames of a file.
+struct Frames<'p> {
+    pixels: &'p [u8],
+    /// Pixels of a frame.
+    area: usize,
+    /// The plane of voxels of each frame.
+    slices: Vec<usize>,
+    bits: usize,
+    /// True where bytes of larger numbers come first.
+    big: bool,
+}
+
+impl Frames<'_> {
+    fn pixel(&self, at: usize) -> u16 {
+        match self.bits {
+            1 => u16::from(self.pixels[at / 8] >> (at % 8) & 1),
+            8 => u16::from(self.pixels[at]),
+            _ => {
+                let pair = [self.pixels[2 * at], self.pixels[2 * at + 1]];
+                if self.big { u16::from_be_bytes(pair) } else { u16::from_le_bytes(pair) }
+            }
+        }
+    }
+
+    /// Voxels of frames whose pixels are numbers of segments.
+    fn labels(
+        &self,
+        dicom: &Dicom,
+        voxels: usize,
+        segments: &[DicomSegment],
+    ) -> Result<Vec<u8>, FileError> {
+        let mut out = vec![0u8; voxels];
+        for (n, slice) in self.slices.iter().enumerate() {
+            for at in 0..self.area {
+                let number = self.pixel(n * self.area + at);
+                let found = segments.iter().position(|s| s.number == number);
+                let label = match found {
+                    // The background may be described or not.
+                    _ if number == 0 => 0,
+                    Some(segment) => segment as u8 + 1,
+                    None => {
+                        let message =
+                            format!("has pixels of segment {number}, which is not described");
+                        return Err(dicom.error(message, SAVE));
+                    }
+                };
+                out[slice * self.area + at] = label;
+            }
+        }
+        Ok(out)
+    }
+
+    /// Layers of voxels of frames of one segment each: each segment in the first layer in which it meets no other.
+    /// `order` has the segments in order, with their frames.
+    fn layers(&self, voxels: usize, order: &[(usize, usize)], threshold: u16) -> Vec<Vec<u8>> {
+        let mut layers: Vec<Vec<u8>> = vec![vec![0; voxels]];
+        for own in order.chunk_by(|a, b| a.0 == b.0) {
+            let places = || {
+                own.iter().flat_map(|&(_, frame)| {
+                    let (from, to) = (frame * self.area, self.slices[frame] * self.area);
+                    let on = (0..self.area).filter(move |at| self.pixel(from + at) >= threshold);
+                    on.map(move |at| to + at)
+                })
+            };
+            let free = |layer: &Vec<u8>| places().all(|at| layer[at] == 0);
+            let layer = layers.iter().position(free).unwrap_or_else(|| {
+                layers.push(vec![0; voxels]);
+                layers.len() - 1
+            });
+            for at in places() {
+                layers[layer][at] = own[0].0 as u8 + 1;
+            }
+        }
+        layers
     }
 }
 
