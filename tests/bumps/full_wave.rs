@@ -75,6 +75,7 @@ const BEHIND_THE_EDGE: [&str; 5] = [
 
 /// A full-wave simulation of the same wires behind the same bumps: `tests/bumps/full_wave.json`.
 #[test]
+#[ignore = "long: ./tools/test.sh --long"]
 fn wires_behind_bumps_stand_as_in_a_full_wave_simulation() {
     let table: Value = serde_json::from_str(include_str!("full_wave.json")).expect("JSON");
     let number = |v: &Value| v.as_f64().expect("a number");

@@ -3,7 +3,7 @@
 use crate::physics::check::Check;
 
 macro_rules! rows {
-    ($($module:ident::$name:ident),* $(,)?) => {
+    ($($module:ident::$name:ident $(($long:literal))?),* $(,)?) => {
         /// All checks, in the order of the table's rows.
         pub fn all() -> Vec<Check> {
             vec![$(super::$module::$name()),*]
@@ -12,6 +12,7 @@ macro_rules! rows {
         #[cfg(test)]
         mod proofs {
             $(#[test]
+            $(#[ignore = $long])?
             fn $name() {
                 let check = super::super::$module::$name();
                 assert_eq!(check.name, stringify!($name));
@@ -45,14 +46,14 @@ rows! {
     refraction::a_slower_cylinder_casts_the_edge_shadow_of_its_entry_angles,
     refraction::a_faster_cylinder_reflects_totally_beyond_its_critical_impact,
     roughness::rough_surfaces_have_the_power_cosine_lobe,
-    thickness::thickness_delays_echoes_by_a_half_normal,
+    thickness::thickness_delays_echoes_by_a_half_normal ("long: ./tools/test.sh --long"),
     thickness::thick_surfaces_lose_coherence_and_keep_energy,
-    brightness::brightness_behind_the_abdominal_wall_does_not_depend_on_paths,
+    brightness::brightness_behind_the_abdominal_wall_does_not_depend_on_paths ("long: ./tools/test.sh --long"),
     invariance::brightness_depends_on_neither_layers_nor_samples,
     invariance::sampling_schemes_agree,
     invariance::tissue_mirrored_by_a_rough_wall_has_the_level_of_many_paths,
     invariance::a_frame_moves_with_its_scene,
-    convergence::images_converge_at_least_with_the_root_of_the_paths,
+    convergence::images_converge_at_least_with_the_root_of_the_paths ("long: ./tools/test.sh --long"),
     energy::the_energy_of_paths_is_absorbed_or_leaves,
     detection::the_baseband_envelope_is_the_hilbert_envelope,
     formation::detection_shows_the_hilbert_envelope,
@@ -69,7 +70,7 @@ rows! {
     fusion_shadows::a_slab_throws_its_shadow_into_the_volume,
     intersections::placements_are_transforms_of_the_mesh,
     squeeze::a_squeezed_slab_is_met_and_refracts_at_its_squeezed_planes,
-    selectors::every_strategy_shows_the_keyframe,
+    selectors::every_strategy_shows_the_keyframe ("long: ./tools/test.sh --long"),
     intersections::closest_hits_are_those_of_brute_force_in_double_precision,
     determinism::a_frame_repeats_bit_for_bit_and_both_tracers_show_it,
     cole::points_and_scatterers_are_those_of_a_convolution_simulator,
@@ -79,7 +80,7 @@ rows! {
     penumbra::the_edge_of_a_shadow_is_as_wide_as_the_aperture_makes_it,
     reverberation::the_echoes_of_a_plate_are_on_every_line,
     vessel::speckle_behind_a_round_vessel_is_as_bright_as_waves_make_it,
-    strips::speckle_is_as_bright_however_refraction_parts_the_paths,
+    strips::speckle_is_as_bright_however_refraction_parts_the_paths ("long: ./tools/test.sh --long"),
 }
 
 #[test]
