@@ -115,9 +115,7 @@ impl Lesson {
     fn guides(&self) -> bool {
         self.open && self.run.is_some() && self.guide && !self.examiner
     }
-}
 
-impl Lesson {
     /// Draws the target and the way of an attempt over the 3D view, by the picture's own camera.
     pub(super) fn in_3d(
         &self,
