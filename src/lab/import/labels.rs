@@ -37,8 +37,10 @@ pub struct Covered {
     pub share: f64,
 }
 
-/// Largest value of a label.
-const MAX_VALUE: f64 = 16_777_216.0;
+/// Largest value of a label: above it single precision, in which voxels are held, has not every whole number.
+const MAX_VALUE: f64 = 16_777_215.0;
+/// Largest distance of a label from a whole number: what scaling and single precision leave of one.
+const OFF: f64 = 1e-3;
 
 impl LabelMap {
     /// Reads a label map: a volume of which every voxel is an integer, 0 for none, or several such layers of segments.
@@ -58,8 +60,11 @@ impl LabelMap {
                 "for its poses give -o NAME.csv; for its images see `insonify reconstruct`";
             return Err(FileError::file(path, message, remedy));
         }
-        let (volume, _) = Volume::load(path)?;
-        let Described { segments, mut remarks } = names::of(path)?;
+        let (volume, warnings) = Volume::load(path)?;
+        let Described { segments, remarks: of_names } = names::of(path)?;
+        let mut remarks: Vec<String> =
+            warnings.into_iter().map(|warning| warning.message).collect();
+        remarks.extend(of_names);
         let layered = segments.iter().any(|s| s.layer > 0);
         if !volume.later.is_empty() && !layered {
             let count = volume.later.len() + 1;
@@ -72,7 +77,12 @@ impl LabelMap {
         let Volume { size, world_from_voxel, voxels, later, .. } = volume;
         let (mut labels, mut layers) = (Vec::new(), Vec::new());
         for (layer, voxels) in std::iter::once(voxels).chain(later).enumerate() {
-            let (voxels, values) = number(path, voxels, labels.len())?;
+            let (voxels, values, off) = number(path, voxels, labels.len())?;
+            if off > 0.0 {
+                remarks.push(format!(
+                    "values are up to {off:.1e} off whole numbers, as after scaling: the nearest ones are the labels"
+                ));
+            }
             labels.extend(values.into_iter().map(|value| segment(&segments, layer, value)));
             layers.push(voxels);
         }
@@ -154,9 +164,14 @@ fn segment(segments: &[Segment], layer: usize, value: u32) -> Segment {
     found.cloned().unwrap_or(Segment { layer, value, names: Vec::new() })
 }
 
-/// Voxels as 0 and numbers from `first + 1` on, in the order of their values, which are returned.
-fn number(path: &Path, voxels: Voxels, first: usize) -> Result<(Vec<u8>, Vec<u32>), FileError> {
-    let values = match &voxels {
+/// Voxels as 0 and numbers from `first + 1` on, in the order of their values, which are returned; and the largest
+/// distance of a value from a whole number.
+fn number(
+    path: &Path,
+    voxels: Voxels,
+    first: usize,
+) -> Result<(Vec<u8>, Vec<u32>, f64), FileError> {
+    let (values, off) = match &voxels {
         Voxels::U8(v) => distinct(path, v.iter().map(|&x| f64::from(x)), first),
         Voxels::I8(v) => distinct(path, v.iter().map(|&x| f64::from(x)), first),
         Voxels::U16(v) => distinct(path, v.iter().map(|&x| f64::from(x)), first),
@@ -183,31 +198,33 @@ fn number(path: &Path, voxels: Voxels, first: usize) -> Result<(Vec<u8>, Vec<u32
         Voxels::I8(v) => v.iter().map(|&x| number(x as u32)).collect(),
         Voxels::U16(v) => v.iter().map(|&x| number(u32::from(x))).collect(),
         Voxels::I16(v) => v.iter().map(|&x| number(x as u32)).collect(),
-        Voxels::F32(v) => v.iter().map(|&x| number(x as u32)).collect(),
+        Voxels::F32(v) => v.iter().map(|&x| number(x.round() as u32)).collect(),
     };
-    Ok((numbers, values))
+    Ok((numbers, values, off))
 }
 
-/// The values above 0, in order.
+/// The values above 0 as whole numbers, in order, and the largest distance of one from that.
 fn distinct(
     path: &Path,
     voxels: impl Iterator<Item = f64>,
     before: usize,
-) -> Result<Vec<u32>, FileError> {
+) -> Result<(Vec<u32>, f64), FileError> {
     const REMEDY: &str = "give a label map: a whole number for each structure, 0 around them";
     let mut seen = BTreeMap::new();
-    let mut last = 0.0;
+    let (mut last, mut most) = (0.0, 0.0f64);
     for value in voxels {
         if value == last {
             continue;
         }
         last = value;
-        if !(0.0..=MAX_VALUE).contains(&value) || value.fract() != 0.0 {
+        let (whole, off) = (value.round(), (value - value.round()).abs());
+        if !(0.0..=MAX_VALUE).contains(&whole) || off > OFF {
             let message = format!("has voxels of {value}: an image and no label map");
             return Err(FileError::file(path, message, REMEDY));
         }
-        if value > 0.0 {
-            seen.insert(value as u32, ());
+        most = most.max(off);
+        if whole > 0.0 {
+            seen.insert(whole as u32, ());
         }
         if before + seen.len() > usize::from(Grid::MOST) {
             let message =
@@ -215,5 +232,5 @@ fn distinct(
             return Err(FileError::file(path, message, REMEDY));
         }
     }
-    Ok(seen.into_keys().collect())
+    Ok((seen.into_keys().collect(), most))
 }

@@ -150,7 +150,7 @@ fn truth(field: &Field) -> bool {
 }
 
 /// Types that are read, by their names; those that are written come first.
-pub(super) const TYPES: [(&str, Scalar); 10] = [
+pub(super) const TYPES: [(&str, Scalar); 12] = [
     ("MET_UCHAR", Scalar::U8),
     ("MET_CHAR", Scalar::I8),
     ("MET_USHORT", Scalar::U16),
@@ -162,6 +162,8 @@ pub(super) const TYPES: [(&str, Scalar); 10] = [
     // In MetaIO a LONG has 32 bits in files.
     ("MET_ULONG", Scalar::U32),
     ("MET_LONG", Scalar::I32),
+    ("MET_LONG_LONG", Scalar::I64),
+    ("MET_ULONG_LONG", Scalar::U64),
 ];
 
 fn kind(fields: &Fields) -> Result<Scalar, FileError> {

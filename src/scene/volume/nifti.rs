@@ -41,6 +41,10 @@ impl Raw<'_> {
         f64::from(f32::from_le_bytes(self.array(at)))
     }
 
+    fn vector(&self, at: usize, stride: usize) -> DVec3 {
+        DVec3::new(self.f32(at), self.f32(at + stride), self.f32(at + 2 * stride))
+    }
+
     fn error(&self, at: usize, message: impl Into<String>, remedy: &str) -> FileError {
         FileError::byte(self.path, at as u64, message, remedy)
     }
@@ -71,7 +75,7 @@ pub(super) fn header(path: &Path) -> Result<Header, FileError> {
     if !(slope.is_finite() && intercept.is_finite()) {
         return Err(raw.error(112, "scl_slope or scl_inter is not a finite number", EXPORT));
     }
-    let (grid, placed) = grid(&raw)?;
+    let Placed { grid, stated, warnings } = placed(&raw, &dims)?;
     let kinds = [Axis::Space, Axis::Space, Axis::Space, Axis::Time];
     let kinds = kinds.into_iter().chain(std::iter::repeat(Axis::Values));
     let axes = kinds.zip(dims.iter().copied());
@@ -91,7 +95,10 @@ pub(super) fn header(path: &Path) -> Result<Header, FileError> {
         payload,
         warnings: Vec::new(),
     };
-    if !placed {
+    for (message, remedy) in warnings {
+        out.warn(path, 1, message, remedy);
+    }
+    if !stated {
         let message = "neither qform nor sform is set: only the spacing is known, RAS is assumed";
         out.warn(path, 1, message, "register it or export it with its position");
     }
@@ -166,6 +173,8 @@ fn kind(raw: &Raw) -> Result<(Scalar, usize), FileError> {
         256 => (Scalar::I8, 1),
         512 => (Scalar::U16, 1),
         768 => (Scalar::U32, 1),
+        1024 => (Scalar::I64, 1),
+        1280 => (Scalar::U64, 1),
         2304 => (Scalar::U8, 4),
         _ => {
             let message = format!("datatype {code} cannot be read");
@@ -203,41 +212,67 @@ fn interval(raw: &Raw) -> Result<(Option<f64>, bool), FileError> {
     Ok((known.then_some(stated / per_second), assumed))
 }
 
-/// Position of voxels by sform, else qform, else spacing alone; and whether one of the first two
-/// is set.
-fn grid(raw: &Raw) -> Result<(Grid, bool), FileError> {
-    let (qform, sform) = (raw.i16(252) > 0, raw.i16(254) > 0);
-    let vector = |at: usize, stride: usize| {
-        DVec3::new(raw.f32(at), raw.f32(at + stride), raw.f32(at + 2 * stride))
-    };
-    let (steps, origin) = if sform {
-        ([280, 284, 288].map(|at| vector(at, 16)), vector(292, 16))
-    } else {
-        let spacing = vector(80, 4);
-        if !(spacing.is_finite() && spacing.cmpgt(DVec3::ZERO).all()) {
-            let message = format!("pixdim is {spacing}: a spacing has to be above zero");
-            return Err(raw.error(80, message, "state the distance between voxels"));
+/// Axes and first voxel, in the unit of the file.
+type Frames = ([DVec3; 3], DVec3);
+
+/// Position of voxels, and what is to be said of it.
+struct Placed {
+    grid: Grid,
+    /// True where qform or sform is set.
+    stated: bool,
+    /// Causes and remedies.
+    warnings: Vec<(String, &'static str)>,
+}
+
+/// Position of voxels by sform, else qform, else spacing alone.
+fn placed(raw: &Raw, dims: &[usize]) -> Result<Placed, FileError> {
+    let mut warnings = Vec::new();
+    let (mut by_qform, mut by_sform) = (None, None);
+    if raw.i16(254) > 0 {
+        let found = ([280, 284, 288].map(|at| raw.vector(at, 16)), raw.vector(292, 16));
+        // What has no volume places nothing; with a sound qform beside it, that does.
+        let [x, y, z] = found.0;
+        let is_sound = x.cross(y).dot(z).abs() > 0.0 && found.1.is_finite();
+        by_sform = (is_sound || raw.i16(252) <= 0).then_some(found);
+        if by_sform.is_none() {
+            let message = "sform has no volume: qform is taken".to_owned();
+            warnings.push((message, "export it with one position"));
         }
-        let q = vector(256, 4);
-        let sound = q.is_finite() && q.length_squared() <= 1.0 + 1e-4;
-        if qform && !sound {
-            let message = format!("the quaternion {q} is longer than one");
-            return Err(raw.error(256, message, EXPORT));
-        }
-        let rotation = if qform {
-            let real = (1.0 - q.length_squared()).max(0.0).sqrt();
-            DQuat::from_xyzw(q.x, q.y, q.z, real).normalize()
-        } else {
-            DQuat::IDENTITY
+    }
+    if raw.i16(252) > 0 {
+        by_qform = match qform(raw) {
+            Ok(found) => Some(found),
+            // It is not needed.
+            Err(_) if by_sform.is_some() => None,
+            Err(error) => return Err(error),
         };
-        // pixdim[0] below zero mirrors the third axis.
-        let handed = if qform && raw.f32(76) < 0.0 { -1.0 } else { 1.0 };
-        let steps = [
-            rotation * DVec3::X * spacing.x,
-            rotation * DVec3::Y * spacing.y,
-            rotation * DVec3::Z * spacing.z * handed,
-        ];
-        (steps, if qform { vector(268, 4) } else { DVec3::ZERO })
+    }
+    if let (Some(sform), Some(qform)) = (by_sform, by_qform) {
+        let (off, step) = (apart(sform, qform, dims), shortest(sform.0));
+        if off > step {
+            let message = format!(
+                "sform and qform put the volume at places that differ by up to {off:.1} mm: sform is taken"
+            );
+            warnings
+                .push((message, "export it with one position, or remove the one that is wrong"));
+        }
+    }
+    if let Some((steps, _)) = by_sform {
+        let stated = raw.vector(80, 4);
+        let own = DVec3::from(steps.map(DVec3::length));
+        let off = ((own - stated) / own).abs().max_element();
+        if off > UNEQUAL && stated.cmpgt(DVec3::ZERO).all() {
+            let message = format!(
+                "pixdim says voxels of {:.3} x {:.3} x {:.3}, sform of {:.3} x {:.3} x {:.3}: sform is taken",
+                stated.x, stated.y, stated.z, own.x, own.y, own.z
+            );
+            warnings.push((message, "export it with one spacing"));
+        }
+    }
+    let stated = by_sform.or(by_qform);
+    let (steps, origin) = match stated {
+        Some(found) => found,
+        None => (spacing(raw, DQuat::IDENTITY, 1.0)?, DVec3::ZERO),
     };
     let unit = match raw.bytes[123] & 7 {
         1 => 1e3,
@@ -246,5 +281,50 @@ fn grid(raw: &Raw) -> Result<(Grid, bool), FileError> {
         _ => 1.0,
     };
     let grid = Grid { steps, origin, frame: Frame::Ras, unit };
-    Ok((grid, qform || sform))
+    Ok(Placed { grid, stated: stated.is_some(), warnings })
+}
+
+/// Part of a length by which two statements of it may differ: single precision and rounded headers.
+const UNEQUAL: f64 = 0.01;
+
+/// The position by the quaternion.
+fn qform(raw: &Raw) -> Result<Frames, FileError> {
+    let q = raw.vector(256, 4);
+    if !(q.is_finite() && q.length_squared() <= 1.0 + 1e-4) {
+        let message = format!("the quaternion {q} is longer than one");
+        return Err(raw.error(256, message, EXPORT));
+    }
+    let real = (1.0 - q.length_squared()).max(0.0).sqrt();
+    let rotation = DQuat::from_xyzw(q.x, q.y, q.z, real).normalize();
+    // pixdim[0] below zero mirrors the third axis.
+    let handed = if raw.f32(76) < 0.0 { -1.0 } else { 1.0 };
+    Ok((spacing(raw, rotation, handed)?, raw.vector(268, 4)))
+}
+
+/// Axes of the spacing that pixdim states.
+fn spacing(raw: &Raw, rotation: DQuat, handed: f64) -> Result<[DVec3; 3], FileError> {
+    let spacing = raw.vector(80, 4);
+    if !(spacing.is_finite() && spacing.cmpgt(DVec3::ZERO).all()) {
+        let message = format!("pixdim is {spacing}: a spacing has to be above zero");
+        return Err(raw.error(80, message, "state the distance between voxels"));
+    }
+    Ok([
+        rotation * DVec3::X * spacing.x,
+        rotation * DVec3::Y * spacing.y,
+        rotation * DVec3::Z * spacing.z * handed,
+    ])
+}
+
+fn shortest(steps: [DVec3; 3]) -> f64 {
+    steps.into_iter().map(DVec3::length).fold(f64::INFINITY, f64::min)
+}
+
+/// The largest distance between the corners of a volume at two places.
+fn apart(a: Frames, b: Frames, dims: &[usize]) -> f64 {
+    let last = |axis: usize| dims.get(axis).map_or(0.0, |n| *n as f64 - 1.0);
+    let corner = |(steps, origin): Frames, number: usize| {
+        let at = |axis: usize| if number >> axis & 1 == 1 { last(axis) } else { 0.0 };
+        origin + (0..3).map(|axis| steps[axis] * at(axis)).sum::<DVec3>()
+    };
+    (0..8).map(|n| corner(a, n).distance(corner(b, n))).fold(0.0, f64::max)
 }

@@ -109,7 +109,7 @@ pub(super) fn header(path: &Path) -> Result<Header, FileError> {
     let tracked = planes::is_tracked(&pairs);
     let of_frames = |key: &str| key.starts_with(frames::PREFIX) || planes::is_known(key);
     let pairs = pairs.iter().map(|f| f.key.as_str());
-    let pairs = pairs.filter(|key| !(tracked && of_frames(key)));
+    let pairs = pairs.filter(|key| !(tracked && of_frames(key)) && !is_of_segments(key));
     let ignored: Vec<_> = strange.chain(pairs).collect();
     out.warnings.extend(unused(path, &ignored));
     if tracked {
@@ -172,6 +172,14 @@ pub(super) fn fields(path: &Path) -> Result<(Fields<'_>, Vec<Field>, u64), FileE
     Ok((Fields { path, list }, pairs, at))
 }
 
+/// True for a key of 3D Slicer about its segments, which `import` reads: `Segment0_Name`, `Segmentation_...`.
+fn is_of_segments(key: &str) -> bool {
+    let Some((of, _)) = key.split_once('_') else { return false };
+    of.strip_prefix("Segment").is_some_and(|rest| {
+        rest == "ation" || !rest.is_empty() && rest.bytes().all(|b| b.is_ascii_digit())
+    })
+}
+
 fn kind(fields: &Fields) -> Result<Scalar, FileError> {
     let field = fields.need("type")?;
     Ok(match field.value.to_ascii_lowercase().as_str() {
@@ -183,6 +191,16 @@ fn kind(fields: &Fields) -> Result<Scalar, FileError> {
         "ushort" | "unsigned short" | "unsigned short int" | "uint16" | "uint16_t" => Scalar::U16,
         "int" | "signed int" | "int32" | "int32_t" => Scalar::I32,
         "uint" | "unsigned int" | "uint32" | "uint32_t" => Scalar::U32,
+        "longlong"
+        | "long long"
+        | "long long int"
+        | "signed long long"
+        | "signed long long int"
+        | "int64"
+        | "int64_t" => Scalar::I64,
+        "ulonglong" | "unsigned long long" | "unsigned long long int" | "uint64" | "uint64_t" => {
+            Scalar::U64
+        }
         "float" => Scalar::F32,
         "double" => Scalar::F64,
         _ => {

@@ -128,10 +128,16 @@ impl Voxels {
         layout: &Layout,
         volume: usize,
     ) -> (Self, usize) {
-        let mut rounded = 0;
+        let (mut rounded, mut rounded_longs) = (0, 0);
         let mut round = |exact: f64| {
             let single = exact as f32;
             rounded += usize::from(f64::from(single) != exact && exact.is_finite());
+            single
+        };
+        // Double precision would round some of them before.
+        let mut round_long = |exact: i128| {
+            let single = exact as f32;
+            rounded_longs += usize::from(single as i128 != exact);
             single
         };
         macro_rules! read {
@@ -160,12 +166,12 @@ impl Voxels {
             Scalar::F32 => Self::F32(read!(f32, |x| x)),
             Scalar::U32 => Self::F32(read!(u32, |x| round(f64::from(x)))),
             Scalar::I32 => Self::F32(read!(i32, |x| round(f64::from(x)))),
-            Scalar::U64 => Self::F32(read!(u64, |x| round(x as f64))),
-            Scalar::I64 => Self::F32(read!(i64, |x| round(x as f64))),
+            Scalar::U64 => Self::F32(read!(u64, |x| round_long(i128::from(x)))),
+            Scalar::I64 => Self::F32(read!(i64, |x| round_long(i128::from(x)))),
             // Decimal fractions are never exact in single precision; only a lost range matters.
             Scalar::F64 => Self::F32(read!(f64, |x| x as f32)),
         };
-        (voxels, rounded)
+        (voxels, rounded + rounded_longs)
     }
 }
 

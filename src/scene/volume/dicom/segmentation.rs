@@ -123,7 +123,7 @@ impl Segmentation {
                     order.push((segment_of(&dicom, frame, &segments)?, n));
                 }
                 order.sort_unstable();
-                at.layers(voxels, &order, kind.threshold(pixels, bits))
+                at.layers(&dicom, voxels, &order, kind.threshold(pixels, bits))?
             }
         };
         Ok(Some(Self { size, world_from_voxel, layers, segments }))
@@ -234,7 +234,13 @@ impl Frames<'_> {
 
     /// Layers of voxels of frames of one segment each: each segment in the first layer in which it meets no other.
     /// `order` has the segments in order, with their frames.
-    fn layers(&self, voxels: usize, order: &[(usize, usize)], threshold: u16) -> Vec<Vec<u8>> {
+    fn layers(
+        &self,
+        dicom: &Dicom,
+        voxels: usize,
+        order: &[(usize, usize)],
+        threshold: u16,
+    ) -> Result<Vec<Vec<u8>>, FileError> {
         let mut layers: Vec<Vec<u8>> = vec![vec![0; voxels]];
         for own in order.chunk_by(|a, b| a.0 == b.0) {
             let places = || {
@@ -245,15 +251,25 @@ impl Frames<'_> {
                 })
             };
             let free = |layer: &Vec<u8>| places().all(|at| layer[at] == 0);
-            let layer = layers.iter().position(free).unwrap_or_else(|| {
-                layers.push(vec![0; voxels]);
-                layers.len() - 1
-            });
+            let layer = match layers.iter().position(free) {
+                Some(layer) => layer,
+                None => {
+                    let bytes = (layers.len() as u64 + 1) * voxels as u64;
+                    if bytes > MAX_BYTES {
+                        let message = "its segments overlap so often that they need more than 4 GB";
+                        return Err(
+                            dicom.error(message, "crop it, or save fewer segments to one file")
+                        );
+                    }
+                    layers.push(vec![0; voxels]);
+                    layers.len() - 1
+                }
+            };
             for at in places() {
                 layers[layer][at] = own[0].0 as u8 + 1;
             }
         }
-        layers
+        Ok(layers)
     }
 }
 

@@ -62,7 +62,7 @@ fn planted_mistakes_in_nifti_headers_name_the_byte() {
         (344, &b"ni1\0"[..], "magic"),
         (40, &9i16.to_le_bytes()[..], "dim[0] is 9"),
         (44, &(-3i16).to_le_bytes()[..], "dim[2] is -3"),
-        (70, &1024i16.to_le_bytes()[..], "datatype 1024"),
+        (70, &1536i16.to_le_bytes()[..], "datatype 1536"),
         (72, &8i16.to_le_bytes()[..], "bitpix is 8"),
         (80, &0.0f32.to_le_bytes()[..], "pixdim"),
         (80, &f32::NAN.to_le_bytes()[..], "pixdim"),
