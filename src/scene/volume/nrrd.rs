@@ -109,7 +109,7 @@ pub(super) fn header(path: &Path) -> Result<Header, FileError> {
     let tracked = planes::is_tracked(&pairs);
     let of_frames = |key: &str| key.starts_with(frames::PREFIX) || planes::is_known(key);
     let pairs = pairs.iter().map(|f| f.key.as_str());
-    let pairs = pairs.filter(|key| !(tracked && of_frames(key)) && !is_of_segments(key));
+    let pairs = pairs.filter(|key| !(is_of_segments(key) || tracked && of_frames(key)));
     let ignored: Vec<_> = strange.chain(pairs).collect();
     out.warnings.extend(unused(path, &ignored));
     if tracked {
