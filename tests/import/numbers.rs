@@ -121,15 +121,22 @@ fn values_that_scaling_left_beside_whole_numbers_are_these_and_told() {
     };
     let (done, expected) = scaled(1.0);
     assert!(done && !expected.contains("off whole numbers"), "{expected}");
-    for by in [1.000_000_1, 1.000_02, 0.999_98, 1.0001] {
+    for by in [1.000_000_1, 1.000_02, 0.999_98, 1.0001, 1.009] {
         let (done, said) = scaled(by);
         assert!(done && said.contains("off whole numbers"), "{by}: {said}");
         let (before, after) = said.split_once("note: ").expect("a note");
         let (_, after) = after.split_once("labels ").expect("its end");
         assert_eq!(format!("{before}{after}"), expected, "{by}");
     }
+    // Stretched over eight bits, as with a slope of 9 / 255.
+    let bytes: Vec<u8> = (all.iter())
+        .map(|v| (*v as f32 * 255.0 / 9.0).round() * 9.0 / 255.0)
+        .flat_map(f32::to_le_bytes)
+        .collect();
+    let (done, said) = imported(folder.path(), "a.nrrd", &nrrd("float", &bytes));
+    assert!(done && said.contains("off whole numbers") && said.contains("liver: liver,"), "{said}");
     // An image stays one.
-    for by in [1.001, 0.5, 1.3] {
+    for by in [1.013, 0.5, 1.3] {
         let (done, said) = scaled(by);
         assert!(!done && said.contains("an image and no label map"), "{by}: {said}");
     }
