@@ -37,6 +37,7 @@ pub mod layout;
 mod line;
 pub mod lobe;
 pub mod memory;
+mod outputs;
 pub mod pass;
 mod pass_kernels;
 mod passes;
@@ -66,17 +67,17 @@ mod skip;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use crate::gpu::{Abandon, AdapterKind, Device, FrameTimings, Frames, GpuError, Image};
+use crate::gpu::{Abandon, AdapterKind, Device, FrameTimings, Frames, GpuError};
 use crate::scene::Scene;
 use crate::settings::Machine;
 use batches::FrameBudget;
 use bvh::Splits;
-use contact::SkinContact;
-use fusion::{FusionResources, Tint};
 use lane::Lane;
 pub use lane::Shot;
 use line::OneLine;
 pub use memory::Memory;
+use outputs::Last;
+pub use outputs::Outputs;
 use pass_kernels::PassKernels;
 use passes::Passes;
 pub use resize::image_size;
@@ -106,35 +107,6 @@ pub fn machine(device: &Device) -> Machine {
         AdapterKind::Cpu => Machine::Software,
         _ => Machine::Gpu,
     }
-}
-
-/// Images that a frame fills, beside the buffers that it leaves: each of the frame's size, [`image_size`].
-#[derive(Clone, Copy, Default)]
-pub struct Outputs<'a> {
-    /// The B-mode image.
-    pub shown: Option<&'a Image>,
-    /// The same with its acquired pixels coloured. Frames that show no acquired volume leave it unchanged.
-    pub tinted: Option<(&'a Image, Tint)>,
-    /// The same with the tissues that are seen in their colours, with an opacity of 0 to 1. Frames without labels leave
-    /// it unchanged.
-    pub painted: Option<(&'a Image, f32)>,
-}
-
-/// What the last frame has.
-#[derive(Clone, Copy, Default)]
-struct Last {
-    /// It was mixed with an acquired volume.
-    fused: bool,
-    /// It has labels.
-    labelled: bool,
-    /// These have levels.
-    levelled: bool,
-    /// Its acquired pixels were coloured.
-    tinted: bool,
-    /// Its tissues were.
-    painted: bool,
-    /// Which of its images is read.
-    chosen: usize,
 }
 
 /// A scene on the device, ready to be imaged frame by frame.
@@ -407,20 +379,6 @@ impl Simulator {
         self.update_time
     }
 
-    /// The contact of the probe with the skin in the chosen image of the last frame; none where the scene asks for no contact.
-    pub fn contact(&self) -> Option<SkinContact> {
-        self.lane().touch
-    }
-
-    /// The device memory that the scene takes.
-    pub fn memory(&self) -> Memory {
-        let fusion = self.passes.lanes[0].fusion.as_ref();
-        Memory {
-            volume: fusion.map_or(0, FusionResources::volume_bytes),
-            ..self.passes.world.memory()
-        }
-    }
-
     /// Waits for the frames in flight and returns their timings, oldest first.
     ///
     /// # Errors
@@ -438,20 +396,5 @@ impl Simulator {
     /// The tables as they are on the device.
     pub fn tables(&self) -> &Tables {
         &self.tables
-    }
-
-    /// The B-mode image of the last frame: width, height, RGBA bytes row by row; transparent outside
-    /// the sector.
-    ///
-    /// # Errors
-    /// A Vulkan error.
-    pub fn pixels(&mut self) -> Result<(u32, u32, Vec<u8>), SimError> {
-        let (width, height) = (self.constants().image_width, self.constants().image_height);
-        Ok((width, height, self.read_again(lane::pixels(self.last.fused))?))
-    }
-
-    /// A warning for the user about how the scene was uploaded, if there is one.
-    pub fn warning(&self) -> Option<&str> {
-        self.passes.lanes[0].fusion.as_ref().and_then(FusionResources::warning)
     }
 }

@@ -1,10 +1,41 @@
 //! Results of the last frame, read from its buffers.
 
+use super::contact::SkinContact;
+use super::fusion::FusionResources;
 use super::pass::Sizes;
-use super::{SimError, Simulator, layout, rf};
+use super::{Memory, SimError, Simulator, lane, layout, rf};
 use crate::probe::Probe;
 
 impl Simulator {
+    /// The contact of the probe with the skin in the chosen image of the last frame; none where the scene asks for no contact.
+    pub fn contact(&self) -> Option<SkinContact> {
+        self.lane().touch
+    }
+
+    /// The device memory that the scene takes.
+    pub fn memory(&self) -> Memory {
+        let fusion = self.passes.lanes[0].fusion.as_ref();
+        Memory {
+            volume: fusion.map_or(0, FusionResources::volume_bytes),
+            ..self.passes.world.memory()
+        }
+    }
+
+    /// The B-mode image of the last frame: width, height, RGBA bytes row by row; transparent outside
+    /// the sector.
+    ///
+    /// # Errors
+    /// A Vulkan error.
+    pub fn pixels(&mut self) -> Result<(u32, u32, Vec<u8>), SimError> {
+        let (width, height) = (self.constants().image_width, self.constants().image_height);
+        Ok((width, height, self.read_again(lane::pixels(self.last.fused))?))
+    }
+
+    /// A warning for the user about how the scene was uploaded, if there is one.
+    pub fn warning(&self) -> Option<&str> {
+        self.passes.lanes[0].fusion.as_ref().and_then(FusionResources::warning)
+    }
+
     /// The counters of the last frame.
     ///
     /// # Errors
