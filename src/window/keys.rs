@@ -57,7 +57,7 @@ const HELP: usize = {
     at
 };
 
-/// Every key but those of panels, with its row in the list of keys; rows without a text belong to the one before.
+/// Every key but those of panels, with its row in the list of keys; a row without names of keys is not in the list.
 const BINDINGS: &[(&str, &[Binding], &str)] = &[
     (
         "Left Right",

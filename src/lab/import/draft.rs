@@ -56,7 +56,7 @@ pub struct Draft {
     pub parts: Vec<Part>,
     /// Structures that are no mesh of the scene, and why.
     pub left_out: Vec<String>,
-    /// What is to be known of structures, in words: what they lose to others that they overlap, and the like.
+    /// Remarks on structures: what they lose to others that they overlap, and the like.
     pub remarks: Vec<String>,
     /// Tissue and origin of the skin, in words.
     pub skin: Option<String>,

@@ -22,11 +22,11 @@ pub struct LabelMap {
     pub layers: Vec<Vec<u8>>,
     /// The labels.
     pub labels: Vec<Segment>,
-    /// What is to be known of them, in words.
+    /// Remarks on them and on the file.
     pub remarks: Vec<String>,
 }
 
-/// What another label has of a label that it overlaps.
+/// A loss of a label to others that it overlaps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Covered {
     /// The label that loses: its place in the list.

@@ -39,8 +39,8 @@ pub fn import(
     progress: Progress,
 ) -> Result<Draft, FileError> {
     progress("read", 0, 1);
-    let map = LabelMap::load(path)?;
-    let (labels, remarks) = (map.labels.clone(), map.remarks.clone());
+    let mut map = LabelMap::load(path)?;
+    let (labels, remarks) = (map.labels.clone(), std::mem::take(&mut map.remarks));
     let mut entries: Vec<Entry> = Vec::new();
     for segment in &labels {
         let names: Vec<_> = segment.names.iter().map(String::as_str).collect();
@@ -133,7 +133,7 @@ pub fn import(
     Ok(draft)
 }
 
-/// What a structure loses to those that it overlaps, in words.
+/// The remark on a structure's loss to those that it overlaps.
 fn overlap(found: &Covered, entries: &[Entry]) -> String {
     let Covered { label, by, share } = *found;
     let [own, other] = [label, by].map(|n| entries[n].name.as_str());

@@ -23,12 +23,12 @@ const MAX_HEAD: u64 = 8 << 20;
 /// Bytes of a NIfTI-1 header.
 const NIFTI: usize = 348;
 
-/// What a file says of its segments.
+/// Segments as a file describes them.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Described {
     /// The segments; none where the file's format or writer has no words for them.
     pub segments: Vec<Segment>,
-    /// What of that cannot be used, in words.
+    /// Remarks on what of that cannot be used.
     pub remarks: Vec<String>,
 }
 
@@ -54,7 +54,7 @@ impl Described {
     }
 }
 
-/// What a file says of its segments. What is malformed there is passed over: the voxels are the segmentation.
+/// Reads the description of a file's segments. What is malformed there is passed over: the voxels are the segmentation.
 ///
 /// # Errors
 /// A file that cannot be read.

@@ -128,16 +128,9 @@ impl Voxels {
         layout: &Layout,
         volume: usize,
     ) -> (Self, usize) {
-        let (mut rounded, mut rounded_longs) = (0, 0);
-        let mut round = |exact: f64| {
-            let single = exact as f32;
-            rounded += usize::from(f64::from(single) != exact && exact.is_finite());
-            single
-        };
-        // Double precision would round some of them before.
-        let mut round_long = |exact: i128| {
-            let single = exact as f32;
-            rounded_longs += usize::from(single as i128 != exact);
+        let mut rounded = 0;
+        let mut round = |single: f32, exact: bool| {
+            rounded += usize::from(!exact);
             single
         };
         macro_rules! read {
@@ -158,20 +151,29 @@ impl Voxels {
                 out
             }};
         }
+        macro_rules! read_whole {
+            ($t:ty, $wider:ty) => {
+                Self::F32(read!($t, |x: $t| round(
+                    x as f32,
+                    x as f32 as $wider == <$wider>::from(x)
+                )))
+            };
+        }
         let voxels = match kind {
             Scalar::U8 => Self::U8(read!(u8, |x| x)),
             Scalar::I8 => Self::I8(read!(i8, |x| x)),
             Scalar::U16 => Self::U16(read!(u16, |x| x)),
             Scalar::I16 => Self::I16(read!(i16, |x| x)),
             Scalar::F32 => Self::F32(read!(f32, |x| x)),
-            Scalar::U32 => Self::F32(read!(u32, |x| round(f64::from(x)))),
-            Scalar::I32 => Self::F32(read!(i32, |x| round(f64::from(x)))),
-            Scalar::U64 => Self::F32(read!(u64, |x| round_long(i128::from(x)))),
-            Scalar::I64 => Self::F32(read!(i64, |x| round_long(i128::from(x)))),
+            // Compared in a type that holds what rounding up makes of the largest of them.
+            Scalar::U32 => read_whole!(u32, i64),
+            Scalar::I32 => read_whole!(i32, i64),
+            Scalar::U64 => read_whole!(u64, i128),
+            Scalar::I64 => read_whole!(i64, i128),
             // Decimal fractions are never exact in single precision; only a lost range matters.
             Scalar::F64 => Self::F32(read!(f64, |x| x as f32)),
         };
-        (voxels, rounded + rounded_longs)
+        (voxels, rounded)
     }
 }
 

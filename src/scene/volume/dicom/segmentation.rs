@@ -211,21 +211,20 @@ impl Frames<'_> {
         voxels: usize,
         segments: &[DicomSegment],
     ) -> Result<Vec<u8>, FileError> {
+        let mut known = vec![None; usize::from(u16::MAX) + 1];
+        for (segment, of) in segments.iter().enumerate().rev() {
+            known[usize::from(of.number)] = Some(segment as u8 + 1);
+        }
+        // The background may be described or not.
+        known[0] = Some(0);
         let mut out = vec![0u8; voxels];
         for (n, slice) in self.slices.iter().enumerate() {
             for at in 0..self.area {
                 let number = self.pixel(n * self.area + at);
-                let found = segments.iter().position(|s| s.number == number);
-                let label = match found {
-                    // The background may be described or not.
-                    _ if number == 0 => 0,
-                    Some(segment) => segment as u8 + 1,
-                    None => {
-                        let message =
-                            format!("has pixels of segment {number}, which is not described");
-                        return Err(dicom.error(message, SAVE));
-                    }
-                };
+                let label = known[usize::from(number)].ok_or_else(|| {
+                    let message = format!("has pixels of segment {number}, which is not described");
+                    dicom.error(message, SAVE)
+                })?;
                 out[slice * self.area + at] = label;
             }
         }
