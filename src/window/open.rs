@@ -61,6 +61,8 @@ pub(super) struct Open {
     /// Next time at which the interface wants to be drawn.
     again: Option<Instant>,
     input: egui_winit::State,
+    /// The modifier keys that are held.
+    held: winit::event::Modifiers,
     window: Arc<Window>,
     title: String,
     opening: Option<Opening>,
@@ -168,6 +170,9 @@ impl Open {
     /// Hands an event to the interface.
     pub(super) fn take(&mut self, event: &WindowEvent) {
         let now = Instant::now();
+        if let WindowEvent::ModifiersChanged(held) = event {
+            self.held = *held;
+        }
         let response = self.input.on_window_event(&self.window, event);
         if response.repaint {
             self.touched = now;

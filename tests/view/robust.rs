@@ -201,14 +201,11 @@ fn a_simulation_that_dies_is_told_and_started_again() {
     desk.wait_for("what is told", |d| difference(&d.grab(TOLD), &bare) > 5.0);
     desk.press(Key::Home);
     desk.wait_for("the same image", |d| difference(&d.grab(BESIDE), &before) < 1.5);
-    let moves = |desk: &mut Desk| {
-        (0..6).for_each(|_| desk.press(Key::Right));
-        desk.wait_for("the image to move", |d| {
-            let now = d.grab(BESIDE);
-            difference(&now, &before) > 4.0 && brightness(&now) > 5.0
-        });
-    };
-    moves(&mut desk);
+    (0..6).for_each(|_| desk.press(Key::Right));
+    desk.wait_for("the image to move", |d| {
+        let now = d.grab(BESIDE);
+        difference(&now, &before) > 4.0 && brightness(&now) > 5.0
+    });
     // Where the next one dies as well, it stands still, and the message says so.
     let message = desk.settle(TOLD);
     kill(&mut desk);
@@ -221,8 +218,14 @@ fn a_simulation_that_dies_is_told_and_started_again() {
     desk.press(Key::Right);
     std::thread::sleep(Duration::from_millis(500));
     assert!(difference(&desk.grab(BESIDE), &still) < 0.5, "there is nothing new");
+    // A key held while the simulation is made is still held for those that follow.
+    desk.hold(Key::Control, true);
     desk.click(START);
-    moves(&mut desk);
+    desk.wait_for("the image to move", |d| difference(&d.grab(BESIDE), &still) > 1.0);
+    let message = desk.settle(TOLD);
+    desk.press(Key::Letter('q'));
+    desk.wait_for("the question", |d| difference(&d.grab(TOLD), &message) > 1.0);
+    desk.hold(Key::Control, false);
     desk.quit();
     let text = std::fs::read_to_string(&told).expect("there");
     assert!(text.contains("a test has asked for it"), "{text}");

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use winit::event::WindowEvent;
 use winit::event_loop::ActiveEventLoop;
 use winit::window::Window;
 
@@ -36,6 +37,13 @@ fn interface(window: &Window, zoom: f32, device: &Device) -> egui_winit::State {
     let root = egui::ViewportId::ROOT;
     let limit = device.limits().max_image_2d as usize;
     egui_winit::State::new(context, root, window, Some(scale), None, Some(limit))
+}
+
+/// Hands over input that has not been seen yet: nothing of it comes again.
+fn hand_over(from: &mut egui_winit::State, to: &mut egui_winit::State) {
+    let (from, to) = (from.egui_input_mut(), to.egui_input_mut());
+    to.focused = from.focused;
+    to.events = std::mem::take(&mut from.events);
 }
 
 impl Open {
@@ -132,7 +140,8 @@ impl Open {
             session,
             model,
             mut state,
-            input,
+            input: mut before,
+            held,
             window,
             title,
             opening,
@@ -151,12 +160,14 @@ impl Open {
         state.panels.all().into_iter().for_each(Panel::lose);
         state.problem = problem;
         (state.stopped, state.restart) = (false, false);
-        let input = interface(&window, input.egui_ctx().zoom_factor(), &device);
+        let mut input = interface(&window, before.egui_ctx().zoom_factor(), &device);
+        hand_over(&mut before, &mut input);
+        let _ = input.on_window_event(&window, &WindowEvent::ModifiersChanged(held));
         let log = device.validation_log();
         let session = plan.session(device, &window, &model)?;
         window.request_redraw();
         let made = Self::with(session, model, state, (input, window), watch);
-        let made = Self { title, opening, saved, ..made };
+        let made = Self { title, opening, saved, held, ..made };
         Ok((made, log))
     }
 
@@ -184,6 +195,7 @@ impl Open {
             awaited: false,
             again: None,
             input,
+            held: Default::default(),
             window,
             title: String::new(),
             opening: None,
