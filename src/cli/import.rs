@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use glam::{DAffine3, DVec3};
 use insonify::import::table::{self, Table};
-use insonify::import::{self, Draft, Options};
+use insonify::import::{self, Draft, LabelMap, Options};
 use insonify::output;
 use insonify::scene::mesh::Units;
 use insonify::scene::tissue::table as tissues;
@@ -20,8 +20,8 @@ use super::reconstruct::spacing;
 /// Arguments of `insonify import`.
 #[derive(Debug, Args)]
 pub struct Import {
-    /// A label map (.nii, .nii.gz, .nrrd, .seg.nrrd, .mha, .mhd), a folder of meshes, one per organ, named after
-    /// them, a configuration of PLUS's simulator (.xml), or for a trajectory a tracked sequence (.mha, .mhd, .nrrd)
+    /// A label map (.nii, .nii.gz, .nrrd, .seg.nrrd, .mha, .mhd), a folder of meshes or of masks, one file per organ,
+    /// named after it, a configuration of PLUS's simulator (.xml), or for a trajectory a tracked sequence (.mha, .mhd, .nrrd)
     #[arg(required_unless_present = "print_table")]
     source: Option<PathBuf>,
     /// Folder of the scene: scene.toml, and the meshes that it shows; or a trajectory (.csv)
@@ -147,7 +147,10 @@ pub fn run(args: &Import) -> Result<()> {
     let done = if source.is_dir() {
         import::folder::import(source, folder, &options, &mut tell)
     } else {
-        import::map::import(source, folder, &options, &mut tell).map(|draft| (draft, Vec::new()))
+        tell("read", 0, 1);
+        let map = LabelMap::load(source)?;
+        let draft = import::map::import(source, map, folder, &options, &mut tell);
+        draft.map(|draft| (draft, Vec::new()))
     };
     if let Some((_, progress)) = shown {
         progress.finish();

@@ -159,7 +159,8 @@ fn a_dicom_segmentation_becomes_a_scene() {
     std::fs::write(folder.join("s.dcm"), &bytes).expect("written");
     let map = LabelMap::load(&folder.join("s.dcm")).expect("a segmentation");
     assert_eq!(map.layers.len(), 2, "they overlap");
-    let (grid, covered) = map.merged(&[20, 30]);
+    let merged = map.merged(&[20, 30], &mut |_, _, _| ()).expect("layers");
+    let (grid, covered) = (merged.grid, merged.covered);
     assert_eq!((covered.len(), covered[0].label, covered[0].by), (1, 0, 1));
     assert!((0.01..0.2).contains(&covered[0].share), "{covered:?}");
     // Empty planes at either end are not in the file.

@@ -8,6 +8,7 @@ use insonify::scene::Mesh;
 mod dicom;
 mod folders;
 mod label_maps;
+mod masks;
 mod numbers;
 mod plus;
 mod segments;

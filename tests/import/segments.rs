@@ -66,7 +66,7 @@ fn imported(folder: &Path, bytes: &[u8]) -> String {
 }
 
 /// The volume that is told of a mesh, ml.
-fn volume(said: &str, name: &str) -> f64 {
+pub fn volume(said: &str, name: &str) -> f64 {
     let after =
         format!(" {said}").split_once(&format!(" {name}: ")).map(|(_, after)| after.to_owned());
     let after = after.unwrap_or_else(|| panic!("no {name}: {said}"));

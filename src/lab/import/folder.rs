@@ -1,4 +1,4 @@
-//! A folder of meshes made into a scene.
+//! A folder of meshes, or of masks, made into a scene.
 
 use std::path::{Path, PathBuf};
 
@@ -9,12 +9,12 @@ use super::grid::Grid;
 use super::map::{self, Progress};
 use super::pose::{self, Task};
 use super::table::{Entry, OUTLINE};
-use super::{Options, hull, raster};
+use super::{Options, hull, masks, raster};
 use crate::issue::FileError;
 use crate::register::points::frame_of_mesh;
 use crate::scene::mesh::{self, Soup};
 use crate::scene::{Issue, Tissue, check::Facts, topology};
-use crate::volume::Frame;
+use crate::volume::{Frame, is_volume};
 
 /// Most meshes of a folder: their numbers are those of voxels.
 const MOST: usize = Grid::MOST as usize;
@@ -23,8 +23,8 @@ const COARSE: f64 = 2.0;
 const MOST_VOXELS: f64 = 200.0;
 /// Distance of an invented skin from the organs, mm.
 const MARGIN: f64 = 15.0;
-/// Share of a mesh inside another from which on it counts as a part of it.
-const WITHIN: f64 = 0.9;
+/// Share of a structure inside another from which on it counts as a part of it.
+pub(super) const WITHIN: f64 = 0.9;
 /// Largest body that is compared in voxels, mm.
 const LARGEST: f64 = 4000.0;
 
@@ -37,31 +37,84 @@ struct Organ {
     volume: f64,
 }
 
-/// The mesh files of a folder, by name.
-fn files(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
+/// The files of a folder that it is imported by.
+pub(super) enum Contents {
+    /// Meshes by name, and the volumes beside them.
+    Meshes(Vec<PathBuf>, Vec<PathBuf>),
+    /// Masks by name.
+    Masks(Vec<PathBuf>),
+}
+
+/// What a folder holds.
+///
+/// # Errors
+/// It cannot be read, or there is nothing in it.
+pub(super) fn contents(folder: &Path) -> Result<Contents, FileError> {
     let fail = |e: std::io::Error| {
         FileError::file(folder, format!("cannot be read: {e}"), "check the path of the folder")
     };
-    let mut out = Vec::new();
+    let (mut meshes, mut masks, mut slices) = (Vec::new(), Vec::new(), 0);
     for entry in std::fs::read_dir(folder).map_err(fail)? {
         let path = entry.map_err(fail)?.path();
-        if mesh::is_mesh(&path) && path.is_file() {
-            out.push(path);
+        if !path.is_file() {
+            continue;
+        } else if mesh::is_mesh(&path) {
+            meshes.push(path);
+        } else if masks::is_mask(&path) {
+            masks.push(path);
+        } else {
+            slices += usize::from(is_volume(&path));
         }
     }
-    out.sort();
-    match out.len() {
-        0 => Err(FileError::file(
-            folder,
-            "holds no mesh that can be read",
-            "give a folder of mesh files, one per organ, named after them; or a label map",
-        )),
-        n if n > MOST => Err(FileError::file(
+    meshes.sort();
+    masks.sort();
+    match (meshes.len(), masks.len()) {
+        (0, 0) => {
+            let message = match slices {
+                0 => "holds no mesh and no mask that can be read".to_owned(),
+                n => format!("holds no mesh and no mask that can be read, but {n} DICOM files"),
+            };
+            let remedy = "give a folder of meshes or of masks, one file per organ, named after it; or a label map; of \
+                          DICOM the file of the segmentation itself";
+            Err(FileError::file(folder, message, remedy))
+        }
+        (0, _) => Ok(Contents::Masks(masks)),
+        (n, _) if n > MOST => Err(FileError::file(
             folder,
             format!("holds {n} meshes, more than {MOST}"),
             "leave in it those that are seen",
         )),
-        _ => Ok(out),
+        _ => Ok(Contents::Meshes(meshes, masks)),
+    }
+}
+
+/// Makes a scene of the meshes or the masks of a folder. Also returns findings on them.
+///
+/// # Errors
+/// A file that cannot be read, or an organ to look at that is not there.
+pub fn import(
+    source: &Path,
+    folder: &Path,
+    options: &Options,
+    progress: Progress,
+) -> Result<(Draft, Vec<Issue>), FileError> {
+    match contents(source)? {
+        Contents::Masks(files) => {
+            let map = masks::of(source, files)?;
+            Ok((map::import(source, map, folder, options, progress)?, Vec::new()))
+        }
+        Contents::Meshes(files, beside) => {
+            let (draft, mut issues) = of_meshes(source, &files, folder, options, progress)?;
+            if let [first, ..] = beside.as_slice() {
+                let message = format!(
+                    "is a volume beside meshes, one of {} in the folder: not read",
+                    beside.len()
+                );
+                let remedy = "a folder is imported by its meshes or, without any, by its masks";
+                issues.push(Issue::warning(first, beside.len(), message, remedy));
+            }
+            Ok((draft, issues))
+        }
     }
 }
 
@@ -69,13 +122,13 @@ fn files(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
 ///
 /// # Errors
 /// A mesh that cannot be read, or an organ to look at that is not there.
-pub fn import(
+fn of_meshes(
     source: &Path,
+    files: &[PathBuf],
     folder: &Path,
     options: &Options,
     progress: Progress,
 ) -> Result<(Draft, Vec<Issue>), FileError> {
-    let files = files(source)?;
     let mut organs = Vec::new();
     let mut issues = Vec::new();
     for (n, file) in files.iter().enumerate() {
@@ -159,7 +212,8 @@ pub fn import(
     Ok((draft, issues))
 }
 
-fn name_of(path: &Path) -> String {
+/// Name of a file without its folder.
+pub(super) fn name_of(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 

@@ -1,11 +1,14 @@
 //! Label maps from files: values of voxels as labels, with the names that the file gives them.
 
-use std::collections::BTreeMap;
-use std::path::Path;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
 
 use glam::DAffine3;
 
+use super::folder::{WITHIN, name_of};
 use super::grid::Grid;
+use super::map::Progress;
+use super::masks;
 use super::names::{self, Described, Segment};
 use crate::issue::FileError;
 use crate::volume::{DicomSegment, Segmentation, Summary, Volume, Voxels};
@@ -20,6 +23,8 @@ pub struct LabelMap {
     /// Layers of voxels, first axis fastest, at least one: labels of one layer do not overlap. 0 is none; label n is
     /// `labels[n - 1]`.
     pub layers: Vec<Vec<u8>>,
+    /// Files of masks, one per label, in the place of layers: all of them at once may be more than memory holds.
+    pub masks: Vec<PathBuf>,
     /// The labels.
     pub labels: Vec<Segment>,
     /// Remarks on them and on the file.
@@ -72,7 +77,8 @@ impl LabelMap {
             return Err(FileError::file(
                 path,
                 format!("holds {count} volumes over time; a label map is one"),
-                "save the one that you want",
+                "save the one that you want; or where each is the mask of a structure, save each as a file of its own, \
+                 named after the structure, in a folder, and import the folder",
             ));
         }
         let Volume { size, world_from_voxel, voxels, later, .. } = volume;
@@ -87,49 +93,140 @@ impl LabelMap {
             labels.extend(values.into_iter().map(|value| segment(&segments, layer, value)));
             layers.push(voxels);
         }
-        if labels.is_empty() {
-            let message = "every voxel is 0: no structure is labelled";
-            return Err(FileError::file(path, message, "give the segmentation"));
-        }
         for own in &segments {
             if !labels.iter().any(|label| (label.layer, label.value) == (own.layer, own.value)) {
                 remarks.push(empty(own));
             }
         }
-        Ok(Self { size, world_from_voxel, layers, labels, remarks })
+        Ok(Self { size, world_from_voxel, layers, masks: Vec::new(), labels, remarks })
     }
 
-    /// One layer: where labels overlap, the one of the highest priority, of equals the one of fewest voxels, so that what
-    /// is small stays whole. Also returns what each loses by that.
-    pub fn merged(self, priorities: &[i32]) -> (Grid, Vec<Covered>) {
-        let Self { size, world_from_voxel, mut layers, labels, .. } = self;
-        let mut counts = vec![0u64; labels.len() + 1];
-        for &label in layers.iter().flatten() {
-            counts[usize::from(label)] += 1;
+    /// Origin of each label, in words: its file, or its value in the one file.
+    pub fn origins(&self) -> Vec<String> {
+        match self.masks.as_slice() {
+            [] => self.labels.iter().map(|label| format!("label {}", label.value)).collect(),
+            masks => masks.iter().map(|file| name_of(file)).collect(),
         }
-        let rank = |label: u8| match usize::from(label) {
-            0 => None,
-            n => Some((priorities[n - 1], u64::MAX - counts[n], n)),
-        };
-        let mut lost = vec![vec![0u64; labels.len() + 1]; labels.len() + 1];
-        let mut voxels = layers.remove(0);
-        for layer in layers {
-            for (below, above) in voxels.iter_mut().zip(layer) {
-                let (winner, loser) = match rank(above) > rank(*below) {
-                    true => (above, *below),
-                    false => (*below, above),
-                };
-                lost[usize::from(loser)][usize::from(winner)] += 1;
-                *below = winner;
+    }
+
+    /// One layer. Where labels overlap, one that lies within the other is above it, however the table ranks their names;
+    /// else the one of the highest priority, of equals the one of fewest voxels, so that what is small stays whole.
+    ///
+    /// # Errors
+    /// A mask that cannot be read, or is none; no voxel in any.
+    pub fn merged(self, priorities: &[i32], progress: Progress) -> Result<Merged, FileError> {
+        let Self { size, world_from_voxel, layers, masks, labels, mut remarks } = self;
+        let mut merging = Merging::new(priorities);
+        layers.into_iter().for_each(|layer| merging.add(layer));
+        for (n, file) in masks.iter().enumerate() {
+            progress("masks", n, masks.len());
+            let (mut voxels, found) = masks::read(file, size, &world_from_voxel)?;
+            voxels.iter_mut().filter(|voxel| **voxel > 0).for_each(|voxel| *voxel = n as u8 + 1);
+            merging.add(voxels);
+            // Most masks of a folder share what is wrong with them.
+            let new = found.into_iter().filter(|remark| !remarks.contains(remark));
+            remarks.extend(new.collect::<Vec<_>>());
+        }
+        let nothing = |(n, _): &(usize, _)| !masks.is_empty() && merging.counts[*n] == 0;
+        remarks.extend((1..).zip(&labels).filter(nothing).map(|(_, label)| empty(label)));
+        let covered = merging.covered();
+        Ok(Merged {
+            grid: Grid { size, world_from_voxel, voxels: merging.voxels },
+            covered,
+            remarks,
+        })
+    }
+}
+
+/// Labels that do not overlap any more.
+#[derive(Clone, Debug)]
+pub struct Merged {
+    /// The labels of the voxels.
+    pub grid: Grid,
+    /// What each has lost.
+    pub covered: Vec<Covered>,
+    /// Remarks on the labels and their files.
+    pub remarks: Vec<String>,
+}
+
+/// Layers of labels on their way to be one.
+struct Merging<'p> {
+    /// Priority of label n, at n - 1.
+    priorities: &'p [i32],
+    /// The labels of the voxels so far.
+    voxels: Vec<u8>,
+    /// Voxels of each label in its own layer.
+    counts: Vec<u64>,
+    /// Voxels that a label has lost, by the label that took them.
+    lost: Vec<Vec<u64>>,
+}
+
+impl<'p> Merging<'p> {
+    fn new(priorities: &'p [i32]) -> Self {
+        let counts = vec![0; priorities.len() + 1];
+        let lost = vec![counts.clone(); counts.len()];
+        Self { priorities, voxels: Vec::new(), counts, lost }
+    }
+
+    /// Adds a layer, whose labels lie in no other.
+    fn add(&mut self, layer: Vec<u8>) {
+        for &label in layer.iter().filter(|label| **label > 0) {
+            self.counts[usize::from(label)] += 1;
+        }
+        if self.voxels.is_empty() {
+            self.voxels = layer;
+            return;
+        }
+        let over = self.winners(&layer);
+        for (below, above) in self.voxels.iter_mut().zip(layer).filter(|(_, above)| *above > 0) {
+            let (winner, loser) = match over.contains(&(above, *below)) || *below == 0 {
+                true => (above, *below),
+                false => (*below, above),
+            };
+            self.lost[usize::from(loser)][usize::from(winner)] += 1;
+            *below = winner;
+        }
+    }
+
+    /// The pairs of a label of `layer` and one that it lies on, of which the first wins: what lies within the other, and
+    /// else what ranks higher.
+    fn winners(&self, layer: &[u8]) -> BTreeSet<(u8, u8)> {
+        let mut both: BTreeMap<(u8, u8), u64> = BTreeMap::new();
+        let (mut last, mut run) = ((0, 0), 0);
+        for pair in layer.iter().copied().zip(self.voxels.iter().copied()).chain([(0, 0)]) {
+            if pair != last {
+                if last.0 > 0 && last.1 > 0 {
+                    *both.entry(last).or_default() += run;
+                }
+                (last, run) = (pair, 0);
             }
+            run += 1;
         }
-        let covered = (1..=labels.len()).filter_map(|n| {
-            let (by, _) = lost[n].iter().enumerate().max_by_key(|(_, count)| **count)?;
-            let sum: u64 = lost[n].iter().sum();
-            let share = sum as f64 / counts[n] as f64;
+        let count = |label: u8| self.counts[usize::from(label)];
+        let rank =
+            |label: u8| (self.priorities[usize::from(label) - 1], u64::MAX - count(label), label);
+        let wins = |(pair, shared): ((u8, u8), u64)| {
+            let (above, below) = pair;
+            let smaller = count(above).min(count(below));
+            let wins =
+                match shared as f64 >= WITHIN * smaller as f64 && count(above) != count(below) {
+                    true => count(above) == smaller,
+                    false => rank(above) > rank(below),
+                };
+            wins.then_some(pair)
+        };
+        both.into_iter().filter_map(wins).collect()
+    }
+
+    fn covered(&self) -> Vec<Covered> {
+        let labels = (1..self.counts.len()).filter(|n| self.counts[*n] > 0);
+        let covered = labels.filter_map(|n| {
+            let (by, _) = self.lost[n].iter().enumerate().max_by_key(|(_, count)| **count)?;
+            let sum: u64 = self.lost[n].iter().sum();
+            let share = sum as f64 / self.counts[n] as f64;
             (sum > 0).then(|| Covered { label: n - 1, by: by - 1, share })
         });
-        (Grid { size, world_from_voxel, voxels }, covered.collect())
+        covered.collect()
     }
 }
 
@@ -149,7 +246,7 @@ fn of_dicom(path: &Path, found: Segmentation) -> Result<LabelMap, FileError> {
     // What others leave around the segments may be described as one.
     let missing = missing.filter(|(_, label)| label.value > 0);
     let remarks = missing.map(|(_, label)| empty(label)).collect();
-    Ok(LabelMap { size, world_from_voxel, layers, labels, remarks })
+    Ok(LabelMap { size, world_from_voxel, layers, masks: Vec::new(), labels, remarks })
 }
 
 /// The remark on a segment without a voxel.
@@ -167,7 +264,7 @@ fn segment(segments: &[Segment], layer: usize, value: u32) -> Segment {
 
 /// Voxels as 0 and numbers from `first + 1` on, in the order of their values, which are returned; and the largest
 /// distance of a value from a whole number.
-fn number(
+pub(super) fn number(
     path: &Path,
     voxels: Voxels,
     first: usize,

@@ -6,7 +6,7 @@ use glam::{DAffine3, DVec3};
 
 use super::draft::{Draft, Part, SKIN};
 use super::grid::Grid;
-use super::labels::{Covered, LabelMap};
+use super::labels::{Covered, LabelMap, Merged};
 use super::pose::{self, Task};
 use super::surface::Surfaces;
 use super::table::{Entry, OUTLINE};
@@ -28,30 +28,35 @@ const MARGIN: f64 = 15.0;
 /// Reports the progress of a stage: name of the items, number done, number in all.
 pub type Progress<'p> = &'p mut dyn FnMut(&str, usize, usize);
 
-/// Makes a scene of a label map in `folder`.
+/// Makes a scene of a label map, read from the file or folder `path`, in `folder`.
 ///
 /// # Errors
-/// The fault of the file; more surface than can be held; an organ to look at that is not there.
+/// The fault of a mask; more surface than can be held; an organ to look at that is not there.
 pub fn import(
     path: &Path,
+    map: LabelMap,
     folder: &Path,
     options: &Options,
     progress: Progress,
 ) -> Result<Draft, FileError> {
-    progress("read", 0, 1);
-    let mut map = LabelMap::load(path)?;
-    let (labels, remarks) = (map.labels.clone(), std::mem::take(&mut map.remarks));
+    let (labels, origins) = (map.labels.clone(), map.origins());
     let mut entries: Vec<Entry> = Vec::new();
     for segment in &labels {
         let names: Vec<_> = segment.names.iter().map(String::as_str).collect();
-        let mut entry = options.table.look_up(Some(segment.value), &names);
+        // What a mask has inside says nothing of the structure.
+        let value = map.masks.is_empty().then_some(segment.value);
+        let mut entry = options.table.look_up(value, &names);
         if entry.name.is_empty() {
             entry.name = format!("label {}", segment.value);
         }
         entries.push(entry);
     }
     let priorities: Vec<i32> = entries.iter().map(|entry| entry.priority).collect();
-    let (mut grid, covered) = map.merged(&priorities);
+    let Merged { mut grid, covered, remarks } = map.merged(&priorities, progress)?;
+    if grid.voxels.iter().all(|label| *label == 0) {
+        let message = "every voxel is 0: no structure is labelled";
+        return Err(FileError::file(path, message, "give the segmentation"));
+    }
     if let Some(spacing) = options.spacing {
         grid = resampled(path, &grid, spacing)?;
     }
@@ -83,14 +88,13 @@ pub fn import(
     let organs = covered.iter().filter(|found| entries[found.label].priority != OUTLINE);
     draft.remarks.extend(organs.map(|found| overlap(found, &entries)));
     let mut target = None;
-    for (n, (entry, segment)) in entries.iter().zip(&labels).enumerate() {
+    for (n, (entry, own)) in entries.iter().zip(origins).enumerate() {
         let label = n as u8 + 1;
         progress("surfaces", n, entries.len());
         if entry.priority == OUTLINE || volumes[usize::from(label)] == 0 {
             continue;
         }
         let surface = surfaces.of(&entry.name, |l| l == label);
-        let own = format!("label {}", segment.value);
         let origin = if entry.name == own { own } else { format!("{own}, {}", entry.name) };
         let name = draft.add(part(entry, origin), &surface)?;
         if chosen == Some(label) {

@@ -62,13 +62,13 @@ pub(super) fn header(path: &Path) -> Result<Header, FileError> {
         return Err(fields.error(dimension, "1 to 16 axes are possible", "correct it"));
     }
     let sizes = fields.sizes(fields.need("sizes")?, n)?;
-    let (directions, frame) = space::directions(&fields, n)?;
-    let axes = space::axes(&fields, n, directions.as_deref())?;
+    let space = space::space(&fields, n)?;
+    let axes = space::axes(&fields, n, &space)?;
     let count = axes.iter().filter(|a| **a == Axis::Space).count();
     let time = axes.iter().position(|a| *a == Axis::Time);
-    let grid = space::grid(&fields, &axes, directions.as_deref(), frame)?;
+    let grid = space::grid(&fields, &axes, &space)?;
     let interval = match time.filter(|&t| count == 3 && sizes[t] > 1) {
-        Some(time) => space::interval(&fields, n, time)?,
+        Some(time) => space::interval(&fields, n, time, &space)?,
         None => None,
     };
     let stacked = count == 2 && time.is_some();
@@ -125,7 +125,7 @@ pub(super) fn header(path: &Path) -> Result<Header, FileError> {
         let message = "is a plane: one slice of 1 mm";
         out.warn(path, 1, message, "give a volume of several slices");
     }
-    if frame == Frame::Unstated {
+    if space.frame == Frame::Unstated {
         let message = "no anatomical frame is stated; LPS is assumed";
         out.warn(path, 1, message, "add `space: left-posterior-superior` or what it is");
     }

@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use glam::DAffine3;
+
 use super::source::MAX_BYTES;
 use super::{Statistics, Volume, Warning};
 use crate::issue::FileError;
@@ -91,22 +93,24 @@ impl Volume {
 
     /// The difference of `next` from this volume, in words that `in FILE` may follow.
     fn difference(&self, next: &Self) -> Option<String> {
-        let size = |v: &Self| {
-            let [x, y, z] = v.size;
-            format!("{x} x {y} x {z}")
-        };
-        if self.size != next.size {
-            return Some(format!("has {} voxels, not {} as", size(next), size(self)));
-        }
         let (kind, own) = (next.voxels.kind(), self.voxels.kind());
-        if kind != own {
-            return Some(format!("holds values of {}, not {} as", kind.name(), own.name()));
+        let of_kind = || format!("holds values of {}, not {} as", kind.name(), own.name());
+        let grid = next.grid_difference(self.size, &self.world_from_voxel);
+        grid.or_else(|| (kind != own).then(of_kind))
+    }
+
+    /// The difference of this volume's grid from one of another size or place, in words that `in FILE` may follow; none
+    /// where both have as many voxels in the same places.
+    pub fn grid_difference(&self, size: [usize; 3], world_from_voxel: &DAffine3) -> Option<String> {
+        let words = |[x, y, z]: [usize; 3]| format!("{x} x {y} x {z}");
+        if self.size != size {
+            return Some(format!("has {} voxels, not {} as", words(self.size), words(size)));
         }
         // Affine: the largest difference is at a corner.
-        let voxel_from_next = self.world_from_voxel.inverse() * next.world_from_voxel;
+        let voxel_from_own = world_from_voxel.inverse() * self.world_from_voxel;
         let corners = (0..8usize).map(|i| {
-            let at = [0, 1, 2].map(|axis| (i >> axis & 1) as f64 * (self.size[axis] - 1) as f64);
-            voxel_from_next.transform_point3(at.into()).distance(at.into())
+            let at = [0, 1, 2].map(|axis| (i >> axis & 1) as f64 * (size[axis] - 1) as f64);
+            voxel_from_own.transform_point3(at.into()).distance(at.into())
         });
         let off = corners.fold(0.0, f64::max);
         (off > SAME_PLACE).then(|| format!("lies up to {off:.2} voxels from where it does"))

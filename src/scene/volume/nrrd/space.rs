@@ -1,22 +1,35 @@
 //! The axes of space of a NRRD file, and their places.
 
-use glam::DVec3;
+use glam::{DVec3, DVec4};
 
 use crate::issue::FileError;
 use crate::volume::fields::{Field, Fields};
-use crate::volume::grid::{self, Frame, Grid};
+use crate::volume::grid::{Frame, Grid};
 use crate::volume::layout::Axis;
 
-/// A vector per axis, none for those outside space.
-pub(super) type Directions = Vec<Option<DVec3>>;
+/// What a header says of the axes in space.
+pub(super) struct Space {
+    /// Direction of each axis times its spacing, none for those outside space; none where no directions are given.
+    pub directions: Option<Vec<Option<DVec3>>>,
+    /// The axis of time and its spacing, where the space has time as its fourth dimension.
+    pub time: Option<(usize, f64)>,
+    /// Frame of the directions.
+    pub frame: Frame,
+}
 
-/// Direction of each axis times its spacing, where given, and the frame.
-pub(super) fn directions(
-    fields: &Fields,
-    n: usize,
-) -> Result<(Option<Directions>, Frame), FileError> {
+/// The space of `n` axes.
+///
+/// # Errors
+/// A space that is unknown; directions that are none.
+pub(super) fn space(fields: &Fields, n: usize) -> Result<Space, FileError> {
     let space = fields.find(&["space"]);
-    let frame = match space.map(|f| f.value.to_ascii_lowercase()).as_deref() {
+    let name = space.map(|f| f.value.to_ascii_lowercase());
+    // With time as the fourth dimension.
+    let still = name.as_deref().map(|name| {
+        let short = ["rast", "last", "lpst"].contains(&name);
+        name.strip_suffix(if short { "t" } else { "-time" }).unwrap_or(name)
+    });
+    let frame = match still {
         Some("right-anterior-superior" | "ras") => Frame::Ras,
         Some("left-anterior-superior" | "las") => Frame::Las,
         Some("left-posterior-superior" | "lps") => Frame::Lps,
@@ -26,24 +39,43 @@ pub(super) fn directions(
             return Err(fields.error(
                 field,
                 "this space cannot be read",
-                "write right-anterior-superior, left-anterior-superior or left-posterior-superior",
+                "write right-anterior-superior, left-anterior-superior or left-posterior-superior, or one of these with \
+                 -time",
             ));
         }
     };
     let Some(field) = fields.find(&["space directions"]) else {
-        return Ok((None, frame));
+        return Ok(Space { directions: None, time: None, frame });
     };
     let vectors = vectors(fields, field)?;
     if vectors.len() != n {
         let message = format!("{} vectors for {n} axes", vectors.len());
         return Err(fields.error(field, &message, "give one vector or `none` per axis"));
     }
-    Ok((Some(vectors), frame))
+    let (mut directions, mut time) = (Vec::with_capacity(n), None);
+    for (axis, vector) in vectors.into_iter().enumerate() {
+        let later = vector.map_or(0.0, |v| v.w);
+        let place =
+            vector.map(DVec4::truncate).filter(|place| later == 0.0 || *place != DVec3::ZERO);
+        if later != 0.0 && (place.is_some() || time.is_some()) {
+            let message = "an axis lies in space and in time, or two lie in time";
+            let remedy =
+                "write axes of space with 0 as their fourth number, and one of time like (0,0,0,1)";
+            return Err(fields.error(field, message, remedy));
+        }
+        time = time.or((later != 0.0).then_some((axis, later)));
+        directions.push(place);
+    }
+    Ok(Space { directions: Some(directions), time, frame })
 }
 
-/// Vectors from text like `(1,0,0) none (0, 1, 0)`; of two components the third is zero.
-fn vectors(fields: &Fields, field: &Field) -> Result<Directions, FileError> {
-    let wrong = || fields.error(field, "is no list of vectors", "write it like (1,0,0) (0,1,0)");
+/// Vectors from text like `(1,0,0) none (0, 1, 0)`, of two to four components; those that are missing are zero.
+fn vectors(fields: &Fields, field: &Field) -> Result<Vec<Option<DVec4>>, FileError> {
+    let wrong = || {
+        let remedy = "write it like (1,0,0) (0,1,0) (0,0,1), or with time as fourth dimension like (1,0,0,0) (0,1,0,0) \
+                      (0,0,1,0) (0,0,0,1)";
+        fields.error(field, "is no list of vectors", remedy)
+    };
     let mut out = Vec::new();
     let mut rest = field.value.trim();
     while !rest.is_empty() {
@@ -55,11 +87,12 @@ fn vectors(fields: &Fields, field: &Field) -> Result<Directions, FileError> {
         let inner = rest.strip_prefix('(').and_then(|r| r.split_once(')'));
         let (inner, after) = inner.ok_or_else(wrong)?;
         let numbers: Result<Vec<f64>, _> = inner.split(',').map(|w| w.trim().parse()).collect();
-        let numbers = numbers.map_err(|_| wrong())?;
-        if !(2..=3).contains(&numbers.len()) {
+        let mut numbers = numbers.map_err(|_| wrong())?;
+        if !(2..=4).contains(&numbers.len()) {
             return Err(wrong());
         }
-        out.push(Some(grid::point(&numbers)));
+        numbers.resize(4, 0.0);
+        out.push(Some(DVec4::from_slice(&numbers)));
         rest = after.trim_start();
     }
     Ok(out)
@@ -67,19 +100,16 @@ fn vectors(fields: &Fields, field: &Field) -> Result<Directions, FileError> {
 
 /// Meaning of each of `n` axes: two or three of space, the first that qualify; of the others one of time,
 /// which may stand anywhere.
-pub(super) fn axes(
-    fields: &Fields,
-    n: usize,
-    directions: Option<&[Option<DVec3>]>,
-) -> Result<Vec<Axis>, FileError> {
+pub(super) fn axes(fields: &Fields, n: usize, space: &Space) -> Result<Vec<Axis>, FileError> {
     let kinds = fields.find(&["kinds"]);
     let kinds: Vec<_> = kinds.map_or(Vec::new(), |k| k.value.split_whitespace().collect());
     let kind = |axis: usize| kinds.get(axis).map_or("domain".into(), |k| k.to_ascii_lowercase());
     let plain = |axis: usize| ["domain", "space", "none", "???"].contains(&kind(axis).as_str());
-    let of_space = |axis: &usize| match directions {
+    let of_space = |axis: &usize| match &space.directions {
         Some(vectors) => vectors[*axis].is_some(),
         None => plain(*axis),
     };
+    let of_time = space.time.map(|(axis, _)| axis);
     let space: Vec<usize> = (0..n).filter(of_space).take(3).collect();
     if space.len() < 2 {
         let field = fields.find(&["space directions", "kinds", "dimension"]);
@@ -96,7 +126,7 @@ pub(super) fn axes(
         "list" => Some((1, axis)),
         _ => (plain(axis) && axis > space[0]).then_some((2, axis)),
     });
-    let time = time.min().map(|(_, axis)| axis);
+    let time = of_time.or_else(|| time.min().map(|(_, axis)| axis));
     Ok((0..n)
         .map(|axis| match space.contains(&axis) {
             true => Axis::Space,
@@ -107,11 +137,20 @@ pub(super) fn axes(
 }
 
 /// Time from one volume to the next along the axis of time, s, where stated.
-pub(super) fn interval(fields: &Fields, n: usize, time: usize) -> Result<Option<f64>, FileError> {
-    let Some(field) = fields.find(&["spacings"]) else {
-        return Ok(None);
+pub(super) fn interval(
+    fields: &Fields,
+    n: usize,
+    time: usize,
+    space: &Space,
+) -> Result<Option<f64>, FileError> {
+    let spacings = fields.find(&["spacings"]);
+    let (field, spacing) = match (space.time, spacings) {
+        (Some((_, spacing)), _) => {
+            (fields.find(&["space directions"]).expect("it has time"), spacing)
+        }
+        (None, Some(field)) => (field, fields.numbers::<f64>(field, n)?[time]),
+        (None, None) => return Ok(None),
     };
-    let spacing = fields.numbers::<f64>(field, n)?[time];
     if spacing.is_nan() {
         return Ok(None);
     }
@@ -122,8 +161,12 @@ pub(super) fn interval(fields: &Fields, n: usize, time: usize) -> Result<Option<
             "state it, or nan where it is not known",
         ));
     }
-    let units = fields.find(&["units"]);
-    let named = units.and_then(|f| f.value.split('"').skip(1).step_by(2).nth(time));
+    // Those of the space are of its dimensions, the others of the axes.
+    let (units, place) = match space.time {
+        Some(_) => (fields.find(&["space units"]), 3),
+        None => (fields.find(&["units"]), time),
+    };
+    let named = units.and_then(|f| f.value.split('"').skip(1).step_by(2).nth(place));
     let per_second = match named.unwrap_or("") {
         "" | "s" | "sec" | "second" | "seconds" => 1.0,
         "ms" | "msec" | "millisecond" | "milliseconds" => 1e3,
@@ -139,16 +182,11 @@ pub(super) fn interval(fields: &Fields, n: usize, time: usize) -> Result<Option<
     Ok(Some(spacing / per_second))
 }
 
-pub(super) fn grid(
-    fields: &Fields,
-    axes: &[Axis],
-    directions: Option<&[Option<DVec3>]>,
-    frame: Frame,
-) -> Result<Grid, FileError> {
+pub(super) fn grid(fields: &Fields, axes: &[Axis], space: &Space) -> Result<Grid, FileError> {
     let mut steps = [DVec3::X, DVec3::Y, DVec3::Z];
     let of_space = axes.iter().enumerate().filter(|(_, a)| **a == Axis::Space);
     let of_space = of_space.map(|(axis, _)| axis);
-    if let Some(vectors) = directions {
+    if let Some(vectors) = &space.directions {
         for (step, axis) in steps.iter_mut().zip(of_space) {
             *step = vectors[axis].expect("an axis of space");
         }
@@ -168,12 +206,12 @@ pub(super) fn grid(
     }
     let origin = match fields.find(&["space origin"]) {
         Some(field) => match vectors(fields, field)?.as_slice() {
-            [Some(origin)] => *origin,
+            [Some(origin)] => origin.truncate(),
             _ => return Err(fields.error(field, "one vector is needed", "write it like (0,0,0)")),
         },
         None => DVec3::ZERO,
     };
-    Ok(Grid { steps, origin, frame, unit: unit(fields, axes)? })
+    Ok(Grid { steps, origin, frame: space.frame, unit: unit(fields, axes)? })
 }
 
 fn unit(fields: &Fields, axes: &[Axis]) -> Result<f64, FileError> {
@@ -186,6 +224,8 @@ fn unit(fields: &Fields, axes: &[Axis]) -> Result<f64, FileError> {
         let mut axes = axes.iter();
         units.retain(|_| axes.next().is_none_or(|a| *a == Axis::Space));
     }
+    // A fourth is that of time.
+    units.truncate(3);
     units.retain(|u| !u.is_empty());
     units.dedup();
     match units.as_slice() {

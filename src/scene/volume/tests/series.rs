@@ -135,6 +135,59 @@ fn every_format_holds_the_same_volumes_over_time() {
     same("b.mha", &bare, None);
 }
 
+/// Time as the fourth dimension of the space, as SimpleITK writes it.
+#[test]
+fn a_space_of_four_dimensions_has_time() {
+    let folder = Folder::new();
+    let file = |space: &str, sizes: &str, directions: &str, order: &str| {
+        let text = format!(
+            "NRRD0004\ntype: short\ndimension: 4\n{space}\nsizes: {sizes}\nspace directions: {directions}\n\
+             kinds: domain domain domain domain\nendian: little\nencoding: raw\nspace origin: (1,2,3,0)\n\n"
+        );
+        [text.into_bytes(), series(order, false)].concat()
+    };
+    let (still, ms) =
+        ("(0.5,0,0,0) (0,1.25,0,0) (0,0,2,0)", "space units: \"mm\" \"mm\" \"mm\" \"ms\"");
+    for (space, sizes, directions, order, stated) in [
+        (
+            "space dimension: 4".to_owned(),
+            "4 3 2 3",
+            format!("{still} (0,0,0,0.05)"),
+            "xyzt",
+            false,
+        ),
+        (
+            "space: left-posterior-superior-time".to_owned(),
+            "4 3 2 3",
+            format!("{still} (0,0,0,0.05)"),
+            "xyzt",
+            true,
+        ),
+        (format!("space: LPST\n{ms}"), "4 3 2 3", format!("{still} (0,0,0,50)"), "xyzt", true),
+        (
+            format!("space: scanner-xyz-time\n{ms}"),
+            "3 4 3 2",
+            format!("(0,0,0,50) {still}"),
+            "txyz",
+            false,
+        ),
+    ] {
+        let (volume, warnings) =
+            folder.load("a.nrrd", &file(&space, sizes, &directions, order)).expect(&space);
+        assert_eq!(wrong(&volume, Some(0.05)), None, "{space}");
+        assert_eq!(volume.spacing(), DVec3::new(0.5, 1.25, 2.0), "{space}");
+        assert_eq!(volume.world_from_voxel.translation, DVec3::new(1.0, 2.0, 3.0), "{space}");
+        assert_eq!(warnings.is_empty(), stated, "{warnings:?}");
+    }
+    let mixed =
+        file("space: LPST", "4 3 2 3", "(0.5,0,0,1) (0,1.25,0,0) (0,0,2,0) (0,0,0,1)", "xyzt");
+    folder.refused("m.nrrd", &mixed, "an axis lies in space and in time");
+    let backwards = file("space: LPST", "4 3 2 3", &format!("{still} (0,0,0,-1)"), "xyzt");
+    folder.refused("b.nrrd", &backwards, "a finite number above zero");
+    let five = file("space: LPST", "4 3 2 3", &format!("{still} (0,0,0,0,1)"), "xyzt");
+    folder.refused("f.nrrd", &five, "is no list of vectors");
+}
+
 /// NRRD's axes come in any order; axes outside space are known by their kind, or by their place.
 #[test]
 fn the_axis_of_time_may_stand_anywhere() {
