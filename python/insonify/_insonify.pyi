@@ -1,8 +1,14 @@
 """Scenes, simulators and frames. Units: mm, microseconds, MHz, dB; times of a scene in seconds."""
 
-from collections.abc import Callable, Mapping, Sequence
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from os import PathLike
 from typing import Any, Literal, TypedDict
+
+if sys.version_info >= (3, 11):
+    from typing import Self
+else:
+    from typing_extensions import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -80,27 +86,48 @@ class Scene:
 
     scene["imaging.gain"] reads a key, scene["imaging.gain"] = "20 dB" sets it, = None takes that back. Quantities are
     read as numbers in the unit that describe(key) names, angles as text; numbers and text with a unit are taken.
+    Scenes are copied by copy.copy and sent to other processes by pickle.
     """
 
     def __init__(self, *, folder: str | PathLike[str] = ".", **tables: Any) -> None:
         """folder: where the files are that the tables name. SceneError: a mistake in them."""
     @staticmethod
     def load(path: str | PathLike[str], overrides: Mapping[str, Any] | None = None) -> Scene:
-        """The scene of a file, with `overrides` as of `--set`. SceneError: a mistake, with file, line and remedy."""
+        """The scene of a file, or one that ships by its name ("abdomen"), with `overrides` as of `--set`. SceneError: a
+        mistake, with file, line and remedy."""
     def __getitem__(self, key: str) -> Any:
         """The value of a key; None where it is not set and has no default. KeyError: scene files have no such key."""
     def __setitem__(self, key: str, value: Any) -> None:
         """Sets a key. Keys of probe, simulation and imaging at once; others read the scene again. SceneError: a value
         that the key does not take; the scene is then as it was."""
+    def __delitem__(self, key: str) -> None:
+        """Takes back what was set by hand, as setting to None does."""
+    def __contains__(self, key: object) -> bool:
+        """True for a key that scene files have."""
+    def __iter__(self) -> Iterator[str]:
+        """The keys that were set by hand, in the order in which they were set."""
+    def __len__(self) -> int:
+        """Number of keys that were set by hand."""
+    def items(self) -> list[tuple[str, Any]]:
+        """The keys that were set by hand, with their values."""
+    def get(self, key: str, default: Any = None) -> Any:
+        """The value of a key; `default` where it is not set, or scene files have no such key."""
+    def update(self, settings: Mapping[str, Any]) -> None:
+        """Sets several keys, one after the other."""
+    def __copy__(self) -> Scene:
+        """A scene of its own with the same anatomy, settings, pose, shapes and time; pickle makes one in another
+        process, which reads the files again that the scene names."""
     def describe(self, key: str) -> dict[str, Any]:
         """unit, range, words (its choices) and meaning of a key."""
     @staticmethod
     def keys() -> list[str]:
         """All keys of scene files: `mesh.NAME.tissue` stands for those of every mesh."""
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        """The scene's title."""
     @property
-    def warnings(self) -> list[str]: ...
+    def warnings(self) -> list[str]:
+        """What is to be said of the scene, its files and its arrays: open edges, triangles that are none, and the like."""
     @property
     def tissues(self) -> list[str]:
         """Names of the tissues, in the order of their numbers in labels."""
@@ -111,7 +138,7 @@ class Scene:
     """The moment that is shown, s."""
     pose: NDArray[np.float64]
     """World from probe space [4, 4], mm: x lateral, y elevation, z depth, the origin in the middle of the face. Taken
-    only if it is a rotation with a shift."""
+    only if it is a rotation with a shift; what is read is a copy that cannot be written into."""
     def set_vertices(self, mesh: str, vertices: ArrayLike) -> None:
         """Moves the vertices [N, 3] (mm) of a mesh that was made of arrays; its tissue moves along. The next frame
         shows it without reading or building anything anew."""
@@ -166,8 +193,16 @@ class Frame:
         that of one of them."""
     @property
     def axes(self) -> dict[str, NDArray[np.float64]]:
-        """Coordinates in probe space, mm: x [W] and z [H] of pixels' centres, depth [K] of samples, origins and
-        directions [L, 3] of scanlines."""
+        """Coordinates in probe space, mm: x [W] and z [H] of pixels' centres, depth [K] of samples, rf_depth [n K] of
+        those of `rf`, origins and directions [L, 3] of scanlines."""
+    @property
+    def extent(self) -> tuple[float, float, float, float]:
+        """Left, right, lower and upper edge of the image, mm, as matplotlib's imshow takes them."""
+    @property
+    def sampling_frequency(self) -> float:
+        """Rate of the samples of `rf`, MHz."""
+    def _repr_png_(self) -> bytes:
+        """The image as PNG, for notebooks."""
 
 class Simulator:
     def __new__(
@@ -178,7 +213,7 @@ class Simulator:
         tracer: Literal["auto", "bvh", "ray-query"] = "auto",
         quality: Literal["draft", "standard", "reference"] | None = None,
         validate: bool = False,
-    ) -> Simulator: ...
+    ) -> Self: ...
     def frame(
         self,
         pose: ArrayLike | None = None,
@@ -186,7 +221,7 @@ class Simulator:
         seed: int | None = None,
         *,
         number: int = 0,
-        want: Sequence[Want] = (),
+        want: Want | Sequence[Want] = (),
     ) -> Frame:
         """Simulates a frame of the scene as it is, or at another pose, time or seed; the scene stays as it was.
 
@@ -208,9 +243,11 @@ class Simulator:
         What moved, labels say as if the anatomy had moved before each of them.
         """
     @property
-    def scene(self) -> Scene: ...
+    def scene(self) -> Scene:
+        """The scene that is simulated."""
     @property
-    def device(self) -> str: ...
+    def device(self) -> str:
+        """Name of the device."""
     @property
     def tracer(self) -> str | None:
         """The tracer; None before the first frame."""
@@ -218,8 +255,9 @@ class Simulator:
     def notes(self) -> list[str]:
         """What was said about scene and device so far."""
     @property
-    def validation_messages(self) -> list[str]: ...
+    def validation_messages(self) -> list[str]:
+        """Messages of Vulkan's validation layers."""
     def close(self) -> None:
         """Gives the device's memory back. Frames keep what was read of them."""
-    def __enter__(self) -> Simulator: ...
+    def __enter__(self) -> Self: ...
     def __exit__(self, *exception: object) -> None: ...

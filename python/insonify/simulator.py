@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -13,8 +14,10 @@ from . import _insonify
 if TYPE_CHECKING:
     from ._insonify import Want
 
-# Most frames of one call into the module, between which a loop shows its progress and can be interrupted.
+# Most frames of one call into the module, and how long it may take, s: between two of them a loop shows its progress and
+# can be interrupted.
 AT_ONCE = 64
+PATIENCE = 0.2
 
 
 @dataclass
@@ -37,11 +40,30 @@ class Frames:
     def __len__(self) -> int:
         return len(self.bmode)
 
-    def __getattr__(self, name: str) -> np.ndarray:
-        others = self.__dict__.get("others", {})
-        if name in others:
-            return others[name]
+    def _other(self, name: str) -> np.ndarray:
+        if name in self.others:
+            return self.others[name]
         raise AttributeError(f"these frames have no {name}; name it in frames(want=...)")
+
+    @property
+    def iq(self) -> np.ndarray:
+        """Complex baseband before time-gain compensation, complex64 [N, L, K]."""
+        return self._other("iq")
+
+    @property
+    def envelope(self) -> np.ndarray:
+        """Envelope after time-gain compensation, float32 [N, L, K]."""
+        return self._other("envelope")
+
+    @property
+    def log(self) -> np.ndarray:
+        """Log-compressed envelope, 0 black to 1 white, float32 [N, L, K]."""
+        return self._other("log")
+
+    @property
+    def rf(self) -> np.ndarray:
+        """Radio-frequency lines before time-gain compensation, float32 [N, L, n K], n samples to each axial one."""
+        return self._other("rf")
 
 
 class Simulator(_insonify.Simulator):
@@ -61,7 +83,7 @@ class Simulator(_insonify.Simulator):
         times: Sequence[float] | None = None,
         seeds: Sequence[int] | None = None,
         *,
-        want: Sequence[Want] = (),
+        want: Want | Sequence[Want] = (),
         progress: bool = False,
     ) -> Frames:
         """Simulates N frames, each at its pose [N, 4, 4], time [N] (s) and seed [N]; what is None stays the scene's.
@@ -79,14 +101,17 @@ class Simulator(_insonify.Simulator):
             raise ValueError(f"not as many of each: {counts}")
         if count == 0:
             raise ValueError("no frames: poses, times or seeds are empty")
-        wanted = list(want)
+        wanted: list[Want] = [want] if isinstance(want, str) else list(want)  # type: ignore[list-item]
         rows: dict[str, np.ndarray] = {}
         labels: dict[str, np.ndarray] = {}
         axes: dict[str, np.ndarray] = {}
         legend: dict[str, Any] = {}
         probe: dict[str, Any] = {}
         counted = _counted(count, progress)
-        for start, end in _together(count, times, "labels" in wanted):
+        start, at_once = 0, 1
+        while start < count:
+            end = _end(start, min(count, start + at_once), times, "labels" in wanted)
+            began = time.monotonic()
             made = self.frames_at_once(
                 end - start,
                 None if poses is None else list(poses[start:end]),
@@ -106,23 +131,25 @@ class Simulator(_insonify.Simulator):
                     legend = legend or frame.legend
                     for label, values in frame.labels.items():
                         _put(labels, label, i, count, values)
+            # As many as are made in time, the first of which tells how long one takes.
+            each = (time.monotonic() - began) / (end - start)
+            at_once = max(1, min(AT_ONCE, 2 * at_once, int(PATIENCE / max(each, 1e-6))))
+            start = end
         next(counted, None)
         return Frames(rows.pop("bmode"), rows.pop("pose"), axes, rows, labels, legend, probe)
 
 
-def _together(count: int, times: Sequence[float] | None, labels: bool) -> Iterator[tuple[int, int]]:
-    """First and last number of the frames that are made together, those between one time and another.
+def _end(start: int, most: int, times: Sequence[float] | None, labels: bool) -> int:
+    """Number behind the last frame that is made together with frame `start`: up to `most`, of the same time.
 
     With labels, the first frame of each time is made alone: they tell what has moved since the frame before.
     """
-    start = 0
-    while start < count:
-        end = start + 1
-        new = labels and (start == 0 or times is not None and times[start] != times[start - 1])
-        while not new and end < min(count, start + AT_ONCE) and (times is None or times[end] == times[start]):
-            end += 1
-        yield start, end
-        start = end
+    if labels and (start == 0 or times is not None and times[start] != times[start - 1]):
+        return start + 1
+    end = start + 1
+    while end < most and (times is None or times[end] == times[start]):
+        end += 1
+    return end
 
 
 def _put(arrays: dict[str, np.ndarray], name: str, i: int, count: int, values: np.ndarray) -> None:
@@ -145,7 +172,6 @@ def _counted(count: int, progress: bool) -> Iterator[int]:
 
 def _told(count: int) -> Iterator[int]:
     import sys
-    import time
 
     began = said = time.monotonic()
     for i in range(count):

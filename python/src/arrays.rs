@@ -122,6 +122,22 @@ pub fn rows<'py>(py: Python<'py>, map: &DAffine3) -> PyResult<Bound<'py, PyAny>>
     shaped(py, values, &[4, 4])
 }
 
+/// The matrix [4, 4] of an affine map that belongs to something else: it cannot be written into, which would change
+/// nothing.
+pub fn fixed_rows<'py>(py: Python<'py>, map: &DAffine3) -> PyResult<Bound<'py, PyAny>> {
+    let rows = rows(py, map)?;
+    rows.getattr("flags")?.setattr("writeable", false)?;
+    Ok(rows)
+}
+
+/// An array [N, 3] of these rows.
+pub fn triples<'py, T: numpy::Element + Copy>(
+    py: Python<'py>,
+    rows: &[[T; 3]],
+) -> PyResult<Bound<'py, PyAny>> {
+    shaped(py, rows.concat(), &[rows.len(), 3])
+}
+
 /// An array of these values.
 pub fn shaped<'py, T: numpy::Element>(
     py: Python<'py>,

@@ -18,7 +18,7 @@ fn failed(error: &DatasetError) -> PyErr {
     }
 }
 
-/// Makes a shard of a data set. `heard(done, samples)` is called after each sample; what it raises ends the run.
+/// As insonify.make_dataset, which has the defaults.
 #[pyfunction]
 #[pyo3(signature = (plan, output, shard, resume, check, device, tracer, heard))]
 #[allow(
@@ -53,6 +53,7 @@ pub fn make_dataset<'py>(
     let heard = heard.clone().unbind();
     let mut raised_by = None;
     if parts > 0 && !check {
+        crate::process::enter()?;
         let made_and_told = py.detach(|| {
             let device = opened(device, wanted, false).map_err(|e| raised(&e))?;
             let mut hear = |_: &Store<'_>, told: Told<'_>| {

@@ -12,13 +12,13 @@ create_exception!(
     insonify,
     InsonifyError,
     PyException,
-    "The simulator cannot do what it is told to."
+    "The simulator cannot do what it is told to: no device, no memory, too large a scene."
 );
 create_exception!(
     insonify,
     SceneError,
     InsonifyError,
-    "A mistake in a scene, its settings or its files: place, cause and remedy."
+    "A mistake in a scene, its settings or its files: place, cause and remedy, as the command line prints it."
 );
 
 /// The exception for an error of the device or the simulator.

@@ -3,9 +3,10 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use glam::{DAffine3, DVec3};
+use insonify::output::picture::grey_png;
 use insonify::probe::Probe;
 use insonify::sim::labels::{LabelValues, Labels};
-use insonify::sim::layout;
+use insonify::sim::{layout, rf};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -57,12 +58,18 @@ pub struct Picture {
     pub pose: DAffine3,
 }
 
+/// An image, and on request what it was made of.
+///
+/// Arrays besides the image are those named in frame(want=...), or of the simulator's last frame any.
+/// L scanlines, K axial samples, an image of H rows and W columns.
 #[pyclass(frozen, module = "insonify")]
 pub struct Frame {
     simulator: Py<Simulator>,
     number: u64,
     picture: Picture,
     contents: Mutex<Vec<(Kind, Contents)>>,
+    /// Arrays that have been made of them: the next time they are the same ones.
+    arrays: Mutex<Vec<(&'static str, Py<PyAny>)>>,
 }
 
 impl Frame {
@@ -72,7 +79,13 @@ impl Frame {
         picture: Picture,
         contents: Vec<(Kind, Contents)>,
     ) -> Self {
-        Self { simulator, number, picture, contents: Mutex::new(contents) }
+        Self {
+            simulator,
+            number,
+            picture,
+            contents: Mutex::new(contents),
+            arrays: Mutex::default(),
+        }
     }
 
     fn shape(&self) -> [usize; 2] {
@@ -90,6 +103,31 @@ impl Frame {
         let contents = simulator.contents(py, self.number, kind, &self.picture.probe)?;
         all().push((kind, contents.clone()));
         Ok(contents)
+    }
+
+    /// The array of this name, made when it is first asked for.
+    fn kept<'py>(
+        &self,
+        py: Python<'py>,
+        name: &'static str,
+        make: impl FnOnce() -> PyResult<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let all = || self.arrays.lock().unwrap_or_else(PoisonError::into_inner);
+        let find = || {
+            let all = all();
+            let found = all.iter().find(|(known, _)| *known == name);
+            found.map(|(_, array)| array.clone_ref(py).into_bound(py))
+        };
+        if let Some(array) = find() {
+            return Ok(array);
+        }
+        let made = make()?;
+        // Another thread may have been faster.
+        if let Some(array) = find() {
+            return Ok(array);
+        }
+        all().push((name, made.clone().unbind()));
+        Ok(made)
     }
 
     fn array<'py>(&self, py: Python<'py>, kind: Kind) -> PyResult<Bound<'py, PyAny>> {
@@ -118,39 +156,45 @@ impl Frame {
 
 #[pymethods]
 impl Frame {
-    /// Grey levels, uint8 [H, W]; 0 outside the sector.
+    /// Grey levels [H, W]; 0 outside the sector.
     #[getter]
     fn bmode<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        shaped(py, self.picture.rgba.chunks_exact(4).map(|p| p[0]).collect(), &self.shape())
+        let grey = || self.picture.rgba.chunks_exact(4).map(|p| p[0]).collect();
+        self.kept(py, "bmode", || shaped(py, grey(), &self.shape()))
     }
 
-    /// True inside the sector, bool [H, W].
+    /// True inside the sector [H, W].
     #[getter]
     fn sector<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        shaped(py, self.picture.rgba.chunks_exact(4).map(|p| p[3] != 0).collect(), &self.shape())
+        let inside = || self.picture.rgba.chunks_exact(4).map(|p| p[3] != 0).collect();
+        self.kept(py, "sector", || shaped(py, inside(), &self.shape()))
     }
 
+    /// Complex baseband before time-gain compensation, relative to a perfect mirror [L, K].
     #[getter]
     fn iq<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.array(py, Kind::Iq)
+        self.kept(py, "iq", || self.array(py, Kind::Iq))
     }
 
+    /// Envelope after time-gain compensation [L, K].
     #[getter]
     fn envelope<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.array(py, Kind::Envelope)
+        self.kept(py, "envelope", || self.array(py, Kind::Envelope))
     }
 
+    /// Log-compressed envelope, 0 black to 1 white [L, K].
     #[getter]
     fn log<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.array(py, Kind::Log)
+        self.kept(py, "log", || self.array(py, Kind::Log))
     }
 
+    /// Radio-frequency lines before time-gain compensation [L, n K], n samples to each axial one.
     #[getter]
     fn rf<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.array(py, Kind::Rf)
+        self.kept(py, "rf", || self.array(py, Kind::Rf))
     }
 
-    /// Labels by name: of the samples [L, K], of the pixels [H, W] behind `pixel_`; places and ways [.., 3].
+    /// Labels (docs/labels.md): of samples [L, K], of pixels [H, W] with `pixel_` before the name.
     #[getter]
     fn labels<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let labelled = self.labelled(py)?;
@@ -168,7 +212,7 @@ impl Frame {
         Ok(out)
     }
 
-    /// Meaning of the labels: tissues, meshes and arrays.
+    /// Meaning of the labels: names of tissues and meshes, units.
     #[getter]
     fn legend<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let labelled = self.labelled(py)?;
@@ -176,19 +220,19 @@ impl Frame {
         py.import("json")?.call_method1("loads", (legend,))
     }
 
-    /// Settings of the probe by their keys.
+    /// Settings of the probe by their keys (docs/scenes.md), in the units of Scene.describe; angles as text.
     #[getter]
     fn probe<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         save::keys(py, &self.picture.probe)
     }
 
-    /// World from probe space, [4, 4].
+    /// World from probe space [4, 4].
     #[getter]
     fn pose<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        arrays::rows(py, &self.picture.pose)
+        arrays::fixed_rows(py, &self.picture.pose)
     }
 
-    /// Milliseconds on the device by stage.
+    /// Milliseconds on the device by stage; of frames that were made together, the mean.
     #[getter]
     fn timings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let out = PyDict::new(py);
@@ -199,13 +243,15 @@ impl Frame {
         Ok(out)
     }
 
-    /// Milliseconds by the clock until the image was read, without Python's part.
+    /// Milliseconds by the clock until the image was read, without Python's part; of frames that were made together,
+    /// that of one of them.
     #[getter]
     fn took(&self) -> f64 {
         self.picture.took_ms
     }
 
-    /// Coordinates of all arrays, mm in probe space.
+    /// Coordinates in probe space, mm: x [W] and z [H] of pixels' centres, depth [K] of samples, rf_depth [n K] of
+    /// those of `rf`, origins and directions [L, 3] of scanlines.
     #[getter]
     fn axes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let Picture { constants: frame, probe, width, height, .. } = &self.picture;
@@ -223,14 +269,40 @@ impl Frame {
         let vectors = |of: fn(&(DVec3, DVec3)) -> DVec3| -> Vec<f64> {
             rays.iter().flat_map(|ray| of(ray).to_array()).collect()
         };
-        let depths = (0..frame.samples).map(|k| f64::from(k) * probe.sample_pitch()).collect();
+        let every = |count: usize, pitch: f64| (0..count).map(|k| k as f64 * pitch).collect();
+        let (samples, finer) = (frame.samples as usize, rf::oversampling(probe));
+        let depths = every(samples, probe.sample_pitch());
+        let rf_depths = every(samples * finer, probe.sample_pitch() / finer as f64);
         let out = PyDict::new(py);
         out.set_item("x", shaped(py, centres(frame.image_left, *width), &[*width as usize])?)?;
         out.set_item("z", shaped(py, centres(frame.image_top, *height), &[*height as usize])?)?;
-        out.set_item("depth", shaped::<f64>(py, depths, &[frame.samples as usize])?)?;
+        out.set_item("depth", shaped::<f64>(py, depths, &[samples])?)?;
+        out.set_item("rf_depth", shaped::<f64>(py, rf_depths, &[samples * finer])?)?;
         out.set_item("origins", shaped(py, vectors(|ray| ray.0), &[lines, 3])?)?;
         out.set_item("directions", shaped(py, vectors(|ray| ray.1), &[lines, 3])?)?;
         Ok(out)
+    }
+
+    /// Left, right, lower and upper edge of the image, mm, as matplotlib's imshow takes them.
+    #[getter]
+    fn extent(&self) -> [f64; 4] {
+        let Picture { constants: frame, width, height, .. } = &self.picture;
+        let [left, top, pitch] =
+            [frame.image_left, frame.image_top, frame.pixel_pitch].map(f64::from);
+        [left, left + f64::from(*width) * pitch, top + f64::from(*height) * pitch, top]
+    }
+
+    /// Rate of the samples of `rf`, MHz.
+    #[getter]
+    fn sampling_frequency(&self) -> f64 {
+        let probe = &self.picture.probe;
+        rf::oversampling(probe) as f64 * probe.speed / (2.0 * probe.sample_pitch())
+    }
+
+    /// The image as PNG, for notebooks.
+    fn _repr_png_(&self) -> Vec<u8> {
+        let Picture { constants, width, height, rgba, .. } = &self.picture;
+        grey_png([*width, *height], rgba, f64::from(constants.pixel_pitch), None)
     }
 
     fn __repr__(&self) -> String {

@@ -10,6 +10,7 @@ mod arrays;
 mod dataset;
 mod error;
 mod frame;
+mod process;
 mod running;
 mod save;
 mod scene;
@@ -22,7 +23,7 @@ use pyo3::types::PyDict;
 
 use error::{InsonifyError, SceneError, raised};
 
-/// The Vulkan devices of this machine: a dictionary each.
+/// The Vulkan devices of this machine. InsonifyError: there is no Vulkan loader.
 #[pyfunction]
 fn devices(py: Python<'_>) -> PyResult<Vec<Bound<'_, PyDict>>> {
     let all = py.detach(gpu::list_devices).map_err(|e| raised(&e))?;
@@ -42,15 +43,13 @@ fn devices(py: Python<'_>) -> PyResult<Vec<Bound<'_, PyDict>>> {
     all.into_iter().map(dictionary).collect()
 }
 
-/// Variables of the environment with which Mesa's software driver compiles kernels in a third of the time; to be set
-/// before the first device is opened. Empty where they are set.
+/// Variables that make Mesa's software driver compile in a third of the time; import sets them.
 #[pyfunction]
 fn driver_environment() -> Vec<(&'static str, std::ffi::OsString)> {
     gpu::driver_environment()
 }
 
-/// Names the interpreter, and its arguments, that compiles kernels in a process of its own by calling
-/// `compile_standard_input`: a fault of a driver's compiler then is an exception here.
+/// Names a program that compiles kernels in a process of its own, by compile_standard_input; import does.
 #[pyfunction]
 fn set_compiler(program: std::path::PathBuf, arguments: Vec<std::ffi::OsString>) {
     gpu::set_compiler(program, arguments);
@@ -71,6 +70,7 @@ fn _insonify(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<scene::Scene>()?;
     module.add_class::<simulator::Simulator>()?;
     module.add_class::<frame::Frame>()?;
+    module.add_function(wrap_pyfunction!(scene::again, module)?)?;
     module.add_function(wrap_pyfunction!(dataset::make_dataset, module)?)?;
     module.add_function(wrap_pyfunction!(save::save, module)?)?;
     module.add_function(wrap_pyfunction!(devices, module)?)?;

@@ -95,7 +95,7 @@ fn axis(name: &str, given: &Bound<'_, PyAny>) -> PyResult<(f64, f64, usize)> {
     }
 }
 
-/// Writes frames as a file of zea or UFF. Arrays are contiguous and of the types that frames have.
+/// As insonify.save, which gathers these facts of frames.
 #[pyfunction]
 #[allow(
     clippy::too_many_arguments,

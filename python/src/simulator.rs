@@ -11,6 +11,7 @@ use pyo3::prelude::*;
 use crate::arrays;
 use crate::error::{InsonifyError, raised};
 use crate::frame::{Contents, Frame, Kind};
+use crate::process;
 use crate::running::{Running, Taken, Together, Wanted};
 use crate::scene::Scene;
 
@@ -42,6 +43,7 @@ impl Simulator {
 
     /// The simulation, open or closed, if no other thread has it.
     fn held(&self) -> PyResult<MutexGuard<'_, Option<Running>>> {
+        process::enter()?;
         match self.running.try_lock() {
             Ok(guard) => Ok(guard),
             Err(TryLockError::Poisoned(poisoned)) => Ok(poisoned.into_inner()),
@@ -71,6 +73,17 @@ impl Simulator {
         let mut running = self.running()?;
         let running = running.as_mut().expect("checked");
         py.detach(|| running.contents(number, kind, probe))
+    }
+}
+
+impl Drop for Simulator {
+    /// In a process that was forked, what was opened before is not touched: its driver would wait for threads that are
+    /// not here.
+    fn drop(&mut self) {
+        if process::is_forked() {
+            let running = self.running.get_mut().unwrap_or_else(PoisonError::into_inner);
+            std::mem::forget(running.take());
+        }
     }
 }
 
@@ -115,8 +128,21 @@ pub fn opened(
     })
 }
 
-fn kinds(want: &[String]) -> PyResult<Vec<Kind>> {
-    want.iter().map(|word| one_of("what is wanted", word, &Kind::ALL)).collect()
+/// The words of `want`: several, or one by itself.
+#[derive(FromPyObject)]
+enum Want {
+    One(String),
+    Several(Vec<String>),
+}
+
+impl Want {
+    fn kinds(&self) -> PyResult<Vec<Kind>> {
+        let words = match self {
+            Self::One(word) => std::slice::from_ref(word),
+            Self::Several(words) => words,
+        };
+        words.iter().map(|word| one_of("what is wanted", word, &Kind::ALL)).collect()
+    }
 }
 
 #[pymethods]
@@ -131,6 +157,7 @@ impl Simulator {
         quality: Option<&str>,
         validate: bool,
     ) -> PyResult<Self> {
+        process::enter()?;
         let wanted = tracer_of(tracer)?;
         let words: Vec<_> =
             Quality::WORDS.iter().copied().zip(Quality::ALL.iter().copied()).collect();
@@ -146,22 +173,28 @@ impl Simulator {
         Ok(Self { scene, running: Mutex::new(Some(running)) })
     }
 
-    #[pyo3(signature = (pose = None, time = None, seed = None, *, number = 0, want = Vec::new()))]
+    /// Simulates a frame of the scene as it is, or at another pose, time or seed; the scene stays as it was.
+    ///
+    /// number: of the frame in a loop, by which the noise of the receiver differs. want: arrays to be read with it.
+    /// RuntimeError: the simulator is closed, or another thread has it. InsonifyError: the device fails.
+    #[pyo3(signature = (pose = None, time = None, seed = None, *, number = 0, want = Want::Several(Vec::new())), text_signature = "($self, pose=None, time=None, seed=None, *, number=0, want=())")]
     fn frame(
         slf: Bound<'_, Self>,
         pose: Option<&Bound<'_, PyAny>>,
         time: Option<f64>,
         seed: Option<u32>,
         number: u32,
-        want: Vec<String>,
+        want: Want,
     ) -> PyResult<Frame> {
         let wanted = Wanted { pose: pose.map(arrays::pose).transpose()?, seed, number };
-        let together = Together { time: time.map(seconds).transpose()?, kinds: kinds(&want)? };
+        let together = Together { time: time.map(seconds).transpose()?, kinds: want.kinds()? };
         let mut frames = Self::made(&slf, vec![wanted], together)?;
         Ok(frames.pop().expect("one image"))
     }
 
-    /// Frames at one time of the scene, numbered from `number` on.
+    /// Simulates `count` frames of the scene at one time, together; `Simulator.frames` is for everybody.
+    ///
+    /// What moved, labels say as if the anatomy had moved before each of them.
     #[pyo3(signature = (count, poses, time, seeds, *, number, want))]
     fn frames_at_once(
         slf: Bound<'_, Self>,
@@ -170,7 +203,7 @@ impl Simulator {
         time: Option<f64>,
         seeds: Option<Vec<u32>>,
         number: u32,
-        want: Vec<String>,
+        want: Want,
     ) -> PyResult<Vec<Frame>> {
         let short = |given: usize| given < count as usize;
         if short(poses.as_ref().map_or(usize::MAX, Vec::len))
@@ -187,7 +220,7 @@ impl Simulator {
             })
         };
         let wanted = (0..count).map(wanted).collect::<PyResult<Vec<_>>>()?;
-        let together = Together { time: time.map(seconds).transpose()?, kinds: kinds(&want)? };
+        let together = Together { time: time.map(seconds).transpose()?, kinds: want.kinds()? };
         Self::made(&slf, wanted, together)
     }
 
@@ -204,7 +237,7 @@ impl Simulator {
         Ok(running.as_ref().expect("checked").device().name().to_owned())
     }
 
-    /// Name of the tracer; None before the first frame.
+    /// The tracer; None before the first frame.
     #[getter]
     fn tracer(&self) -> PyResult<Option<String>> {
         let running = self.running()?;
@@ -223,7 +256,7 @@ impl Simulator {
         Ok(self.running()?.as_ref().expect("checked").device().validation_messages())
     }
 
-    /// Gives the device's memory back; frames keep what was read of them.
+    /// Gives the device's memory back. Frames keep what was read of them.
     fn close(&self, py: Python<'_>) -> PyResult<()> {
         let running = self.held()?.take();
         py.detach(|| drop(running));

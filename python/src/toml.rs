@@ -1,10 +1,11 @@
 //! Values of Python as TOML writes them.
 
 use insonify::scene::file::quoted;
-use insonify::settings::{Form, Value, plain};
+use insonify::settings::{Facts, Form, Value, plain};
+use pyo3::IntoPyObjectExt;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
-use pyo3::types::{PyBool, PyDict, PyString};
+use pyo3::types::{PyBool, PyDict, PyList, PyString};
 
 /// A value as TOML writes it: numbers, strings, booleans, sequences, and dictionaries as inline tables.
 pub fn text(value: &Bound<'_, PyAny>) -> PyResult<String> {
@@ -77,4 +78,43 @@ pub fn object<'py>(py: Python<'py>, value: &Value, form: Form) -> PyResult<Bound
         Value::Texts(texts) => texts.clone().into_pyobject(py)?.into_any(),
         Value::Absent => py.None().into_bound(py),
     })
+}
+
+/// What a scene file states of a key, in TOML, as [`object`] gives the values of settings: quantities as numbers.
+pub fn stated<'py>(py: Python<'py>, toml: &str, facts: &Facts) -> PyResult<Bound<'py, PyAny>> {
+    let value = toml::from_str::<toml::Table>(&format!("value = {toml}"));
+    match value.ok().and_then(|mut table| table.remove("value")) {
+        Some(value) => plain_object(py, &value, facts),
+        // A table with tables of its own below it.
+        None => toml.into_bound_py_any(py),
+    }
+}
+
+fn plain_object<'py>(
+    py: Python<'py>,
+    value: &toml::Value,
+    facts: &Facts,
+) -> PyResult<Bound<'py, PyAny>> {
+    use toml::Value::{Array, Boolean, Datetime, Float, Integer, String, Table};
+    match value {
+        String(text) => match facts.measure().and_then(|measure| measure.parse(text).ok()) {
+            Some(number) => object(py, &Value::Number(number), facts.form),
+            None => text.into_bound_py_any(py),
+        },
+        Integer(number) => number.into_bound_py_any(py),
+        Float(number) => number.into_bound_py_any(py),
+        Boolean(flag) => flag.into_bound_py_any(py),
+        Datetime(date) => date.to_string().into_bound_py_any(py),
+        Array(values) => {
+            let values = values.iter().map(|value| plain_object(py, value, facts));
+            Ok(PyList::new(py, values.collect::<PyResult<Vec<_>>>()?)?.into_any())
+        }
+        Table(entries) => {
+            let out = PyDict::new(py);
+            for (key, value) in entries {
+                out.set_item(key, plain_object(py, value, facts)?)?;
+            }
+            Ok(out.into_any())
+        }
+    }
 }

@@ -27,6 +27,38 @@ def test_arrays_have_their_shapes_and_axes(simulator):
     assert axes["x"].shape == (frame.bmode.shape[1],) and axes["z"].shape == (200,)
     assert axes["depth"][1] == 40 / 512 and axes["origins"].shape == axes["directions"].shape == (48, 3)
     assert (frame.pose == np.eye(4)).all()
+    # Half the way of sound there and back: sample j of a line lies at j c / (2 fs).
+    depth, speed = axes["rf_depth"], frame.probe["speed"]
+    assert depth.shape == (frame.rf.shape[1],)
+    assert np.allclose(depth, np.arange(len(depth)) * speed / (2 * frame.sampling_frequency))
+    pixel = axes["x"][1] - axes["x"][0]
+    edges = (axes["x"][0] - pixel / 2, axes["x"][-1] + pixel / 2, axes["z"][-1] + pixel / 2, axes["z"][0] - pixel / 2)
+    assert np.allclose(frame.extent, edges)
+
+
+def test_what_is_written_into_an_array_of_a_frame_stays(simulator):
+    frame = simulator.frame()
+    for name in ("bmode", "sector", "iq", "envelope", "log", "rf"):
+        assert getattr(frame, name) is getattr(frame, name)
+    frame.bmode[...] = 3
+    assert (frame.bmode == 3).all()
+    with pytest.raises(ValueError, match="read-only"):
+        frame.pose[0, 3] += 5
+
+
+def test_a_notebook_shows_the_image(simulator):
+    from io import BytesIO
+
+    from PIL import Image
+
+    frame = simulator.frame()
+    assert (np.asarray(Image.open(BytesIO(frame._repr_png_()))) == frame.bmode).all()
+
+
+def test_one_thing_is_wanted_by_its_word_alone(simulator):
+    assert simulator.frame(want="iq").iq.shape == (48, 512)
+    with pytest.raises(ValueError, match="it is one of"):
+        simulator.frame(want="iqq")
 
 
 def test_stages_are_timed(simulator):

@@ -20,6 +20,61 @@ def test_settings_are_read_and_set_as_the_manual_says(scene):
     assert "white" in scene.describe("imaging.gain")["meaning"]
 
 
+def test_a_scene_is_a_mapping_of_what_was_set(scene):
+    assert len(scene) == 0 and list(scene) == []
+    scene.update({"imaging.gain": 4, "probe.frequency": "4 MHz"})
+    assert list(scene) == ["imaging.gain", "probe.frequency"] and len(scene) == 2
+    assert dict(scene.items()) == {"imaging.gain": 4.0, "probe.frequency": 4.0}
+    assert "imaging.gain" in scene and "imaging.dynamic_range" in scene
+    assert "imaging.gian" not in scene and 3 not in scene
+    assert scene.get("imaging.gian", 5) == 5 and scene.get("contact.gel", "none") == "none"
+    del scene["imaging.gain"]
+    assert list(scene) == ["probe.frequency"]
+
+
+def test_what_a_file_states_is_read_as_numbers_and_lists():
+    scene = insonify.Scene.load("abdomen")
+    assert isinstance(scene["contact.gel"], float) and scene.describe("contact.gel")["unit"] == "mm"
+    assert scene["contact.mesh"] == ["skin", "body"] or isinstance(scene["contact.mesh"], list)
+    position = scene["probe.pose.position"]
+    assert len(position) == 3 and all(isinstance(number, float) for number in position)
+    assert isinstance(scene["mesh.liver.tissue"], str)
+
+
+def test_scenes_that_ship_are_loaded_by_name(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert insonify.Scene.load("phantom").meshes == insonify.Scene.load(ROOT / "scenes/phantom.toml").meshes
+    with pytest.raises(insonify.SceneError, match="scenes that ship: abdomen"):
+        insonify.Scene.load("fantom")
+
+
+def test_meshes_of_arrays_are_warned_of_as_those_of_files(tmp_path):
+    vertices, triangles = sphere(centre=(0, 0, 20))
+    rows = [f"v {x} {y} {z}" for x, y, z in vertices.tolist()]
+    for faces, words in [
+        (triangles, []),
+        (triangles[5:], ["open edges", "leaks"]),
+        (triangles[:, ::-1], ["inside out"]),
+        (np.concatenate([triangles, triangles[:3, [0, 0, 1]]]), ["degenerate"]),
+    ]:
+        told = [text.split("; ")[0].split(": ")[-1] for text in ball(vertices, faces).warnings]
+        lines = [f"f {a} {b} {c}" for a, b, c in (faces + 1).tolist()]
+        (tmp_path / "ball.obj").write_text("\n".join([*rows, *lines]))
+        file = insonify.Scene(folder=tmp_path, background="liver", mesh={"ball": {"file": "ball.obj", "units": "mm", "tissue": "water"}}, **QUICK)
+        assert told == [text.split("; ")[0].split(": ")[-1] for text in file.warnings]
+        assert bool(told) == bool(words) and all(word in " ".join(ball(vertices, faces).warnings) for word in words), told
+    with pytest.raises(ValueError, match="units.*multiply them"):
+        mesh = {"tissue": "water", "vertices": vertices, "triangles": triangles, "units": "m"}
+        insonify.Scene(background="liver", mesh={"ball": mesh}, **QUICK)
+
+
+def test_what_would_change_nothing_cannot_be_written(scene):
+    with pytest.raises(ValueError, match="read-only"):
+        scene.pose[0, 3] += 5
+    with pytest.raises(ValueError, match="read-only"):
+        scene.placement("ball")[0, 3] += 5
+
+
 def test_none_takes_a_value_back(scene):
     before = scene["imaging.gain"]
     scene["imaging.gain"] = before + 5

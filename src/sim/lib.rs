@@ -45,7 +45,7 @@ pub mod placement;
 mod read_out;
 mod resize;
 mod results;
-mod rf;
+pub mod rf;
 pub mod rounds;
 pub mod seen;
 pub mod shaders;

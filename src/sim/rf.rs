@@ -3,7 +3,7 @@
 use crate::probe::Probe;
 
 /// Samples of the RF line per axial sample, so that its rate is at least four times f0.
-pub(super) fn oversampling(probe: &Probe) -> usize {
+pub fn oversampling(probe: &Probe) -> usize {
     let rate = probe.speed / (2.0 * probe.sample_pitch());
     (4.0 * probe.frequency / rate).ceil().max(1.0) as usize
 }

@@ -14,6 +14,7 @@ use crate::scene::{Mesh, Origin, Scene, Warning};
 use crate::settings::Settings;
 
 /// The text of a scene file.
+#[derive(Clone)]
 pub struct SceneFile {
     source: Source,
 }
@@ -47,6 +48,11 @@ impl SceneFile {
         path: &str,
     ) -> Result<Option<String>, SceneError> {
         Ok(self.source.with(entries).document()?.stated(path))
+    }
+
+    /// The file, whether it exists or not.
+    pub fn path(&self) -> &Path {
+        &self.source.path
     }
 
     /// The text.
