@@ -33,6 +33,14 @@ pub fn note(text: impl Display) {
     let _ = writeln!(stderr(), "{text}");
 }
 
+/// A value as the text of a JSON file.
+///
+/// # Panics
+/// A value that JSON cannot have: keys that are no texts.
+pub fn json(value: &impl serde::Serialize) -> String {
+    serde_json::to_string_pretty(value).expect("plain values") + "\n"
+}
+
 /// Returns the exit code of a program that ended so, and tells the error, or that lines of its output are missing.
 pub fn exit(ended: miette::Result<ExitCode>) -> ExitCode {
     match ended {

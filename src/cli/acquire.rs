@@ -14,7 +14,7 @@ use insonify::sim::shaders::Library;
 use insonify::volume::{Format, Reconstruction, Sequence, Settings, write_meta};
 use miette::{Context, IntoDiagnostic, Result, miette};
 
-use super::common::{self, Common, Progress};
+use super::common::{self, Common, Progress, Stage};
 use super::reconstruct::{spacing, tell};
 
 mod planes;
@@ -53,7 +53,7 @@ pub struct Acquire {
     #[arg(long, value_parser = spacing, default_value = "0.5", requires = "volume")]
     spacing: DVec3,
     /// Frames per second of the timestamps; a file has times of its own.
-    #[arg(long, value_name = "HZ", default_value_t = 20.0, value_parser = rate)]
+    #[arg(long, value_name = "HZ", default_value_t = 20.0, value_parser = common::between(1e-3, 1e4))]
     rate: f64,
     /// Lets the anatomy move on as the timestamps do [default: it stands still].
     #[arg(long)]
@@ -93,14 +93,6 @@ fn way(text: &str) -> Result<Way, String> {
         "rotate" => Sweep::Rotate(turn()?),
         _ => return Err(format!("`{kind}` is no sweep: linear, tilt and rotate are")),
     }))
-}
-
-fn rate(text: &str) -> Result<f64, String> {
-    let value: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
-    match (1e-3..=1e4).contains(&value) {
-        true => Ok(value),
-        false => Err("it must lie between 0.001 and 10000".to_owned()),
-    }
 }
 
 fn period(text: &str) -> Result<f64, String> {
@@ -227,11 +219,7 @@ fn simulate(
     stations: &[Station],
     mut taken: impl FnMut(Sequence) -> Result<()>,
 ) -> Result<()> {
-    let device = args.common.device()?;
-    let tracer = args.common.tracer(&device, scene)?;
-    args.common.settle(scene, &device);
-    let library = Library::embedded();
-    let mut simulator = common::simulator(&device, &library, scene, tracer)?;
+    let Stage { device, mut simulator, .. } = args.common.stage(scene, &Library::embedded())?;
     let count = args.volumes.unwrap_or(1);
     let frames = stations.len() as u32;
     let mut progress = Progress::new(count * frames, "frames");

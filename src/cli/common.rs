@@ -8,6 +8,7 @@ use std::time::Instant;
 
 use clap::builder::{PathBufValueParser, TypedValueParser};
 use miette::{IntoDiagnostic, Report, Result, miette};
+use serde::Serialize;
 
 use insonify::gpu::{Device, DeviceOptions, GpuError, cache_folder};
 use insonify::output;
@@ -54,6 +55,18 @@ pub struct Common {
     pub validate: bool,
 }
 
+/// A scene on a device.
+pub struct Stage {
+    /// The device.
+    pub device: Arc<Device>,
+    /// The tracer that follows the rays.
+    pub tracer: Tracer,
+    /// The scene's simulator.
+    pub simulator: Simulator,
+    /// Time to upload the scene and to build its structures, ms.
+    pub upload_ms: f64,
+}
+
 /// Which tracer follows the rays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum TracerChoice {
@@ -73,6 +86,26 @@ pub fn scene_file() -> impl TypedValueParser<Value = PathBuf> {
 /// A time on the command line, s.
 pub fn seconds(text: &str) -> Result<f64, String> {
     insonify::settings::units::DURATION.finite(text)
+}
+
+/// Parser of a number from `least` to `most` on the command line.
+pub fn between(least: f64, most: f64) -> impl Fn(&str) -> Result<f64, String> + Clone {
+    move |text| {
+        let value: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
+        match (least..=most).contains(&value) {
+            true => Ok(value),
+            false => Err(format!("it must lie between {least} and {most}")),
+        }
+    }
+}
+
+/// Writes a JSON file, or a stream.
+///
+/// # Errors
+/// Errors of the file system; a file that was there is then unchanged.
+pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
+    let written = files::replace(path, output::json(value).as_bytes());
+    written.map_err(|e| miette!("writing {}: {e}", path.display()))
 }
 
 impl Common {
@@ -123,6 +156,20 @@ impl Common {
             output::note(why);
         }
         Ok(tracer)
+    }
+
+    /// Puts a loaded scene on the requested device, with its seed, time and quality set.
+    ///
+    /// # Errors
+    /// No such device or tracer, or one for which the scene is too large.
+    pub fn stage(&self, scene: &mut Scene, library: &Library) -> Result<Stage> {
+        let device = self.device()?;
+        let tracer = self.tracer(&device, scene)?;
+        self.settle(scene, &device);
+        let began = Instant::now();
+        let simulator = simulator(&device, library, scene, tracer)?;
+        let upload_ms = began.elapsed().as_secs_f64() * 1e3;
+        Ok(Stage { device, tracer, simulator, upload_ms })
     }
 
     /// Overrides of the scene file at `path`: by `--paper` and `--pose`, and by `--set` after that.

@@ -11,7 +11,7 @@ use insonify::settings::Group;
 use insonify::sim::shaders::Library;
 use miette::{Result, miette};
 
-use super::common::{self, Common};
+use super::common::{self, Common, Stage};
 
 mod table;
 
@@ -73,11 +73,8 @@ pub fn run(args: &Match) -> Result<()> {
         common::writable(output)?;
     }
     let mut scene = args.common.scene(&args.scene)?;
-    let device = args.common.device()?;
-    let tracer = args.common.tracer(&device, &scene)?;
-    args.common.settle(&mut scene, &device);
-    let library = Library::embedded();
-    let mut simulator = common::simulator(&device, &library, &scene, tracer)?;
+    let stage = args.common.stage(&mut scene, &Library::embedded())?;
+    let Stage { device, mut simulator, .. } = stage;
     let fits = |what| args.fit.contains(&what);
     let options = Options {
         band: args.band,

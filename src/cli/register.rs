@@ -10,7 +10,7 @@ use insonify::register::{Fit, Placement, Transformation, icp, scale_of};
 use insonify::scene::file::{Entry, save_with};
 use insonify::scene::{Acquired, Scene};
 use insonify::volume::Frame;
-use miette::{IntoDiagnostic, Result, WrapErr, miette};
+use miette::{Result, miette};
 
 use super::common::{self, notes, seconds, writable};
 
@@ -137,9 +137,7 @@ pub fn run(args: &Register) -> Result<()> {
     write(args, &entries, &target, &made)?;
     if let Some(file) = &args.json {
         let report = told::json(&made, &target.table, &placement, &warnings);
-        let text = serde_json::to_string_pretty(&report).into_diagnostic()? + "\n";
-        let written = std::fs::write(file, text).into_diagnostic();
-        written.wrap_err_with(|| format!("writing {}", file.display()))?;
+        common::write_json(file, &report)?;
     }
     Ok(())
 }

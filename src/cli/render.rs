@@ -1,12 +1,11 @@
 //! `insonify render`: a scene to a B-mode image.
 
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
-use miette::{Context, IntoDiagnostic, Result, miette};
+use miette::{IntoDiagnostic, Result, miette};
 use serde_json::{Map, Value, json};
 
-use super::common::{self, Common, Progress};
+use super::common::{self, Common, Progress, Stage};
 use insonify::gpu::{Device, FrameTimings, peak_bytes};
 use insonify::output;
 use insonify::scene::{Scene, file, shipped};
@@ -51,7 +50,7 @@ pub struct Render {
     /// Frames per second of the scene's time [default: time stands still, and only noise differs;
     /// along a trajectory it goes on as that does]. Without it an animated GIF shows 10 frames a
     /// second, or as many as the trajectory has.
-    #[arg(long, value_parser = rate)]
+    #[arg(long, value_parser = common::between(1e-3, 1e4))]
     fps: Option<f64>,
     /// Poses of the probe (.csv, .toml): what the window has recorded, or columns time_s, x_mm, y_mm,
     /// z_mm, qw, qx, qy, qz. --frames alone are spread evenly from its first row to its last. --time
@@ -82,14 +81,6 @@ pub struct Render {
     glsl: Option<PathBuf>,
 }
 
-fn rate(text: &str) -> Result<f64, String> {
-    let value: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
-    match (1e-3..=1e4).contains(&value) {
-        true => Ok(value),
-        false => Err("it must lie between 0.001 and 10000".to_owned()),
-    }
-}
-
 /// Runs the command.
 ///
 /// # Errors
@@ -112,14 +103,9 @@ pub fn run(args: &Render) -> Result<()> {
         scene.simulation.labels = true;
     }
     let of_file = scene.simulation.clone();
-    let device = args.common.device()?;
-    let tracer = args.common.tracer(&device, &scene)?;
-    args.common.settle(&mut scene, &device);
     let mut library = library(args)?;
-
-    let loaded = Instant::now();
-    let mut simulator = common::simulator(&device, &library, &scene, tracer)?;
-    let build_ms = loaded.elapsed().as_secs_f64() * 1e3;
+    let Stage { device, tracer, mut simulator, upload_ms: build_ms } =
+        args.common.stage(&mut scene, &library)?;
 
     let said = said(args, &output, &scene, &of_file, &device, tracer)?;
     let (timings, said) =
@@ -163,10 +149,7 @@ pub fn run(args: &Render) -> Result<()> {
             "validation_messages": messages,
         });
         report.extend(figures.as_object().expect("made as one").clone());
-        let text = serde_json::to_string_pretty(&report).into_diagnostic()? + "\n";
-        std::fs::write(file, text)
-            .into_diagnostic()
-            .wrap_err_with(|| format!("writing {}", file.display()))?;
+        common::write_json(file, &report)?;
     }
     args.common.validated(&device)
 }

@@ -42,18 +42,10 @@ pub struct Serve {
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
     frames: Option<u32>,
     /// Images per second at most.
-    #[arg(long, default_value_t = 30.0, value_parser = rate)]
+    #[arg(long, default_value_t = 30.0, value_parser = common::between(0.1, 1000.0))]
     fps: f64,
     #[command(flatten)]
     common: Common,
-}
-
-fn rate(text: &str) -> Result<f64, String> {
-    let value: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
-    match (0.1..=1000.0).contains(&value) {
-        true => Ok(value),
-        false => Err("it must lie between 0.1 and 1000".to_owned()),
-    }
 }
 
 /// Runs the command.

@@ -95,7 +95,7 @@ pub fn run(args: &Arguments) -> Result<()> {
         scores.push(json);
     }
     if args.json {
-        output::line(serde_json::to_string_pretty(&scores).into_diagnostic()?);
+        output::line(output::json(&scores).trim_end());
     }
     Ok(())
 }

@@ -11,7 +11,7 @@ use insonify::scene::Scene;
 use insonify::sim::shaders::Library;
 use miette::{Context, IntoDiagnostic, Result, miette};
 
-use super::common::{self, Common};
+use super::common::{self, Common, Stage};
 use pictures::{Picture, Studio};
 use record::Record;
 
@@ -84,13 +84,10 @@ pub fn run(args: &Vary) -> Result<()> {
             args.show
         ));
     }
-    let device = common.device()?;
-    let tracer = common.tracer(&device, &scene)?;
-    common.settle(&mut scene, &device);
+    let Stage { device, simulator, .. } = common.stage(&mut scene, &Library::embedded())?;
     for mask in scene.masks_off_the_image() {
         output::note(format!("warning: {}", common::unseen(&scene, mask)));
     }
-    let simulator = common::simulator(&device, &Library::embedded(), &scene, tracer)?;
     let mut studio = Studio::new(simulator);
     let pictures = match args.show {
         Show::Parameters => {

@@ -16,6 +16,7 @@ use super::session::{Wake, waker};
 use super::statistics::Times;
 use super::{Options, ViewError};
 use crate::gpu::{GpuError, Screenshot, ValidationLog};
+use crate::output::{self, files};
 use crate::scene::Scene;
 use crate::sim::SimError;
 
@@ -57,8 +58,7 @@ impl App {
                 let (sent, dropped) = (link.status.images_sent, link.status.images_dropped);
                 report["clients"] = json!({ "images_sent": sent, "images_dropped": dropped });
             }
-            let text = format!("{report:#}\n");
-            let written = std::fs::write(file, text);
+            let written = files::replace(file, output::json(&report).as_bytes());
             self.failure = self.failure.or(written.err().map(|e| unwritten(file, &e)));
         }
         if let Some(failure) = self.failure {

@@ -8,9 +8,10 @@ use std::path::{Path, PathBuf};
 const DRAFTS: u32 = 100;
 
 /// A file that is being written beside its place, as `.NAME.` with a number, and takes its place when it is
-/// finished: no failure leaves half a file. Dropped before, it is removed.
+/// finished: no failure leaves half a file. Dropped before, it is removed. Pipes and devices are written to as they are.
 pub struct Draft {
     path: PathBuf,
+    /// Where it is written; `path` itself for a stream.
     beside: PathBuf,
     /// None once the file has taken its place.
     file: Option<File>,
@@ -22,6 +23,10 @@ impl Draft {
     /// # Errors
     /// Errors of the file system; `path` is then unchanged.
     pub fn new(path: &Path) -> Result<Self> {
+        if is_stream(path) {
+            let file = std::fs::OpenOptions::new().write(true).open(path)?;
+            return Ok(Self { path: path.to_owned(), beside: path.to_owned(), file: Some(file) });
+        }
         let path = path.canonicalize().unwrap_or_else(|_| path.to_owned());
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let mine = std::process::id();
@@ -50,8 +55,10 @@ impl Draft {
     /// # Errors
     /// Errors of the file system; the place is then unchanged.
     pub fn finish(mut self) -> Result<()> {
-        self.open().sync_all()?;
-        std::fs::rename(&self.beside, &self.path)?;
+        if self.beside != self.path {
+            self.open().sync_all()?;
+            std::fs::rename(&self.beside, &self.path)?;
+        }
         self.file = None;
         Ok(())
     }
@@ -69,7 +76,7 @@ impl Write for Draft {
 
 impl Drop for Draft {
     fn drop(&mut self) {
-        if self.file.is_some() {
+        if self.file.is_some() && self.beside != self.path {
             // A partial file is of no use; the first error is the one to report.
             let _ = std::fs::remove_file(&self.beside);
         }
@@ -93,9 +100,6 @@ pub fn is_stream(path: &Path) -> bool {
 /// # Errors
 /// Errors of the file system; `path` is then unchanged.
 pub fn replace(path: &Path, bytes: &[u8]) -> Result<()> {
-    if is_stream(path) {
-        return std::fs::write(path, bytes);
-    }
     let mut draft = Draft::new(path)?;
     draft.write_all(bytes)?;
     draft.finish()

@@ -3,6 +3,8 @@
 use std::io::Write;
 use std::path::Path;
 
+use super::files::Draft;
+
 /// Type of the 32-bit words of an array.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Element {
@@ -32,9 +34,9 @@ impl Element {
 /// # Errors
 /// Errors of the file system.
 pub fn write(path: &Path, element: Element, shape: &[usize], bytes: &[u8]) -> std::io::Result<()> {
-    let mut file = std::io::BufWriter::new(std::fs::File::create(path)?);
+    let mut file = std::io::BufWriter::new(Draft::new(path)?);
     write_to(&mut file, element, shape, bytes)?;
-    file.flush()
+    file.into_inner()?.finish()
 }
 
 /// Writes the same to `out`.

@@ -206,7 +206,8 @@ impl Film {
                 output::line(&images);
                 sidecar = Some(images.sidecar());
             }
-            Reel::Movie(_) => {
+            Reel::Movie(movie) => {
+                movie.finish().into_diagnostic()?;
                 output::line(output.display());
                 self.said.insert("file".into(), name(output));
                 sidecar = Some(output.with_extension("json"));
@@ -237,9 +238,7 @@ impl Film {
         self.said.insert("frames".into(), self.frames.into());
         let beside = |path: &PathBuf| elsewhere != Some(path) && !files::is_stream(output);
         if let Some(path) = sidecar.filter(beside) {
-            let text = serde_json::to_string_pretty(&self.said).into_diagnostic()? + "\n";
-            files::replace(&path, text.as_bytes())
-                .map_err(|e| miette!("writing {}: {e}", path.display()))?;
+            common::write_json(&path, &self.said)?;
         }
         Ok(self.said)
     }

@@ -78,7 +78,7 @@ impl LabelFiles {
     pub fn add(&self, index: u32, simulator: &mut Simulator, scene: &Scene) -> Result<()> {
         let labels = simulator.labels().into_diagnostic()?.expect("the scene asks for them");
         let legend = labels::legend(scene, simulator.constants());
-        let legend = serde_json::to_string_pretty(&legend).into_diagnostic()?;
+        let legend = output::json(&legend);
         let path = self.files.path(index);
         let written = match self.format {
             Format::Arrays => arrays(&path, &labels, &legend),

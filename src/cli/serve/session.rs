@@ -14,7 +14,7 @@ use insonify::sim::shaders::Library;
 use miette::Result;
 
 use super::Serve;
-use crate::cli::common;
+use crate::cli::common::{self, Stage};
 
 /// The entries of a scene file that clients have set, as `--set` takes them.
 type Entries = Vec<(String, String)>;
@@ -48,10 +48,7 @@ impl<'a> Session<'a> {
         let common = &args.common;
         let mut scene = common.scene(&args.scene)?;
         let file = SceneFile::read(&args.scene)?;
-        let device = common.device()?;
-        common.settle(&mut scene, &device);
-        let tracer = common.tracer(&device, &scene)?;
-        let simulator = common::simulator(&device, &Library::embedded(), &scene, tracer)?;
+        let Stage { device, simulator, .. } = common.stage(&mut scene, &Library::embedded())?;
         Ok(Self {
             args,
             device,

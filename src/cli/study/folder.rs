@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use insonify::output::files;
+use insonify::output::{self, files};
 use insonify::scene::file::Plan;
 use insonify::study::key::crc32;
 use miette::{Context, IntoDiagnostic, Result, miette};
@@ -97,7 +97,7 @@ impl Folder {
             None => {}
         }
         self.remove_unfinished().into_diagnostic().wrap_err_with(|| format!("tidying {root}"))?;
-        let text = serde_json::to_string_pretty(settings).expect("plain values") + "\n";
+        let text = output::json(settings);
         self.write(&self.settings(), text.as_bytes())
     }
 

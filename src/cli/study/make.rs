@@ -249,7 +249,7 @@ fn write(plan: &Plan, cases: &[Case], mut rows: Vec<Row>, folder: &Folder) -> Re
     }
     .html();
     let manifest = json!({ "study": key.id(), "images": listed });
-    let manifest = serde_json::to_string_pretty(&manifest).expect("plain values") + "\n";
+    let manifest = output::json(&manifest);
     let file = folder.form().join("form.html");
     folder.write(&folder.key(), key.text().as_bytes())?;
     folder.write(&folder.form().join("manifest.json"), manifest.as_bytes())?;

@@ -8,6 +8,7 @@ use serde_json::{Map, Value, json};
 use super::plan::{Array, Plan};
 use super::studio::Made;
 use crate::exchange::wxyz;
+use crate::output;
 use crate::output::indexed::{self, NOTHING};
 use crate::output::npy::{self, Element};
 use crate::scene::file::stated_pose;
@@ -30,7 +31,7 @@ pub(super) fn extensions(plan: &Plan) -> Vec<String> {
 pub(super) fn members(plan: &Plan, made: &Made) -> Vec<Vec<u8>> {
     let mut out = vec![grey(made), indexed(plan, made)];
     out.extend(plan.arrays.iter().map(|array| npy(*array, made)));
-    let facts = serde_json::to_string_pretty(&facts(plan, made)).expect("plain values") + "\n";
+    let facts = output::json(&facts(plan, made));
     out.push(facts.into_bytes());
     out
 }

@@ -15,7 +15,7 @@ use super::members::{IMAGE, SEGMENTATION, extensions, members};
 use super::plan::{Format, Part, Plan};
 use super::studio::{Made, Studio};
 use crate::issue::FileError;
-use crate::output::files;
+use crate::output::{self, files};
 
 const MANIFEST: &str = "manifest.json";
 const PLAN: &str = "plan.toml";
@@ -140,7 +140,7 @@ impl<'p> Store<'p> {
                         "name a new folder",
                     );
                 }
-                let text = serde_json::to_string_pretty(&manifest).expect("plain values") + "\n";
+                let text = output::json(&manifest);
                 self.write(&self.root.join(PLAN), self.plan.text().as_bytes())?;
                 self.write(&path, text.as_bytes())?;
             }

@@ -1,10 +1,12 @@
 //! Frames as an animated GIF.
 
-use std::fs::File;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
 use gif::{Encoder, Frame, Repeat};
+
+use crate::output::files::Draft;
+
 /// Reason for which an animation was not written.
 #[derive(Debug, thiserror::Error)]
 #[error("writing {}: {cause}", path.display())]
@@ -26,8 +28,8 @@ pub struct Movie {
 
 /// State of the file: the format needs the size of the first frame before anything else.
 enum State {
-    Empty(BufWriter<File>),
-    Begun(Encoder<BufWriter<File>>),
+    Empty(BufWriter<Draft>),
+    Begun(Encoder<BufWriter<Draft>>),
     Failed,
 }
 
@@ -38,12 +40,12 @@ impl Movie {
         extension.is_some_and(|e| e.eq_ignore_ascii_case("gif"))
     }
 
-    /// Begins a file; replaces an existing one.
+    /// Begins a file, which takes the place of an existing one when it is finished.
     ///
     /// # Errors
     /// Errors of the file system.
     pub fn new(path: &Path) -> Result<Self, MovieError> {
-        let file = File::create(path).map_err(|e| failed(path, e))?;
+        let file = Draft::new(path).map_err(|e| failed(path, e))?;
         Ok(Self { path: path.to_owned(), state: State::Empty(BufWriter::new(file)), shown: 0.0 })
     }
 
@@ -62,6 +64,22 @@ impl Movie {
         let delay = centiseconds(self.shown, end);
         self.shown = 100.0 * end;
         self.write(width, height, rgba, delay).map_err(|e| failed(&self.path, e))
+    }
+
+    /// Puts the file into its place; without a frame there is none.
+    ///
+    /// # Errors
+    /// Errors of the file system.
+    pub fn finish(self) -> Result<(), MovieError> {
+        let Self { path, state, .. } = self;
+        let finished = match state {
+            State::Begun(encoder) => encoder.into_inner().and_then(|file| {
+                let file = file.into_inner().map_err(std::io::IntoInnerError::into_error)?;
+                Ok(file.finish()?)
+            }),
+            State::Empty(_) | State::Failed => Ok(()),
+        };
+        finished.map_err(|e| failed(&path, e))
     }
 
     fn write(
@@ -134,12 +152,14 @@ mod tests {
             let grey = (0..=255u8).map(|g| g.wrapping_add(offset));
             grey.flat_map(|g| [g, g, g, if g < 9 { 0 } else { 255 }]).collect()
         };
+        std::fs::write(&path, "before").expect("written");
         let mut movie = Movie::new(&path).expect("made");
         for (offset, end) in [(0, 0.05), (7, 0.1)] {
             movie.add(16, 16, &picture(offset), end).expect("written");
         }
-        drop(movie);
-        let file = std::io::BufReader::new(File::open(&path).expect("there"));
+        assert_eq!(std::fs::read(&path).expect("the one before"), b"before");
+        movie.finish().expect("written");
+        let file = std::io::BufReader::new(std::fs::File::open(&path).expect("there"));
         let frames = GifDecoder::new(file).expect("a GIF").into_frames();
         let frames = frames.collect_frames().expect("whole");
         assert_eq!(frames.len(), 2);

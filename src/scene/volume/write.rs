@@ -1,7 +1,6 @@
 //! Writing MetaImage (.mha): one file, header and zlib data, little endian.
 
 use std::fmt::Write as _;
-use std::fs::File;
 use std::io::Write as _;
 use std::path::Path;
 
@@ -11,6 +10,7 @@ use glam::DMat3;
 
 use super::{Volume, Voxels, meta};
 use crate::issue::FileError;
+use crate::output::files::Draft;
 
 /// A header under construction.
 pub(super) struct Header(String);
@@ -78,9 +78,10 @@ impl Header {
 /// Writes a file of a header and data.
 pub(super) fn create(path: &Path, header: &str, data: &[u8]) -> Result<(), FileError> {
     let write = || {
-        let mut file = File::create(path)?;
+        let mut file = Draft::new(path)?;
         file.write_all(header.as_bytes())?;
-        file.write_all(data)
+        file.write_all(data)?;
+        file.finish()
     };
     write().map_err(|e| {
         FileError::file(

@@ -7,6 +7,7 @@ use serde_json::json;
 use super::super::Simulator;
 use super::{DumpError, png};
 use crate::output::npy::{self, Element};
+use crate::output::{self, files};
 use crate::scene::Scene;
 
 /// One axis of a dumped array.
@@ -44,10 +45,9 @@ fn sidecar(dir: &Path, name: &str, meaning: &str, axes: &[Axis]) -> Result<(), D
         .iter()
         .map(|a| json!({"name": a.name, "unit": a.unit, "start": a.start, "step": a.step, "size": a.size}))
         .collect();
-    let text = serde_json::to_string_pretty(&json!({"meaning": meaning, "axes": axes}))
-        .expect("plain JSON");
+    let text = output::json(&json!({"meaning": meaning, "axes": axes}));
     let path = dir.join(format!("{name}.json"));
-    std::fs::write(&path, text + "\n").map_err(|e| DumpError::file(&path, e))
+    files::replace(&path, text.as_bytes()).map_err(|e| DumpError::file(&path, e))
 }
 
 /// Writes every stage of the last frame.

@@ -80,7 +80,8 @@ impl Clip {
             progress.step();
         }
         match reel {
-            Reel::Gif(_) | Reel::Sequence(_) => {}
+            Reel::Sequence(_) => {}
+            Reel::Gif(movie) => movie.finish()?,
             Reel::Mp4(film) => film.finish()?,
             Reel::Dicom(film, ends) => film.finish_at(&ends)?,
         }

@@ -8,6 +8,7 @@ use image::{DynamicImage, ImageFormat, RgbaImage};
 use serde_json::Value;
 
 use super::{CaptureError, Sidecar};
+use crate::output;
 
 /// A number that no other capture of a folder has, reserved by its sidecar. The files written under
 /// it are removed unless all are kept.
@@ -68,7 +69,7 @@ impl Claim {
 
     /// Writes the sidecar and keeps all files.
     pub(super) fn keep(mut self, sidecar: &Sidecar) -> Result<(), CaptureError> {
-        let text = serde_json::to_string_pretty(sidecar).expect("plain values") + "\n";
+        let text = output::json(sidecar);
         let written = self.sidecar.write_all(text.as_bytes());
         written.map_err(|e| CaptureError::file(&self.written[0], e))?;
         self.kept = true;
