@@ -151,6 +151,8 @@ fn state(scene: &Scene) -> (DAffine3, Vec<Placed>) {
 #[derive(Default)]
 struct Told {
     tracker: String,
+    /// Why nothing moves the probe.
+    silence: String,
     status: Status,
     at: Option<Instant>,
 }
@@ -179,6 +181,18 @@ impl Told {
         }
         if status.refused != self.status.refused {
             output::note(format!("clients refused, because there is no room: {}", status.refused));
+        }
+        let silence = server.silent().unwrap_or_default();
+        if silence != self.silence {
+            if !silence.is_empty() {
+                output::note(format!("warning: {silence}"));
+            }
+            self.silence = silence;
+        }
+        if status.unchecked > 0 && self.status.unchecked == 0 {
+            output::note(
+                "warning: messages come without checksums: what is damaged on its way is not noticed",
+            );
         }
         if status.errors != self.status.errors {
             let last = status.last_error.as_deref().unwrap_or_default();

@@ -49,6 +49,8 @@ pub(super) struct Report {
     pub(super) address: SocketAddr,
     /// Numbers of clients and messages so far.
     pub(super) status: Status,
+    /// Why the probe stays although messages come in.
+    pub(super) silence: Option<String>,
     /// State of the tracker.
     pub(super) tracked: TrackerState,
 }
@@ -96,6 +98,7 @@ impl Link {
         self.0.lock().as_ref().map(|server| Report {
             address: server.address(),
             status: server.status(),
+            silence: server.silent(),
             tracked: server.pose(),
         })
     }

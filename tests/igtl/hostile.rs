@@ -54,6 +54,11 @@ fn a_wrong_checksum_costs_the_message_and_many_the_connection() {
     for _ in 0..40 {
         client.send_bytes(&wrong);
     }
+    let Content::Status { message, .. } = client.receive_kind("STATUS").content else {
+        panic!("no status")
+    };
+    let said = String::from_utf8_lossy(&message).into_owned();
+    assert!(said.contains("16 faulty messages in a row") && said.contains("checksum"), "{said}");
     assert!(client.is_ended());
     until("it is told", || last_error(&server).contains("16 faulty messages"));
     assert_eq!(server.status().errors, 18);

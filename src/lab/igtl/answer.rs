@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use super::client::{Answer, Client, Subscriptions};
 use super::command::{self, Order};
-use super::message::{Content, ExtendedHeader, Header, Message, TrackedTool};
+use super::message::{self, Content, ExtendedHeader, Header, Message, PlacedTool, TrackedTool};
 use super::picture::Published;
 use super::server::Shared;
 use super::tracking::TrackerState;
@@ -15,9 +15,11 @@ use super::wire::Label;
 use super::{IMAGE_DEVICE, POSE_DEVICE};
 
 /// Types of messages from a client that have an effect.
-const ACCEPTED_TYPES: [&str; 14] = [
+const ACCEPTED_TYPES: [&str; 16] = [
     "TRANSFORM",
     "TDATA",
+    "POSITION",
+    "QTDATA",
     "STRING",
     "COMMAND",
     "GET_CAPABIL",
@@ -35,14 +37,15 @@ const OK: u8 = 0;
 const ERROR: u8 = 1;
 /// Kind of a tool with six degrees of freedom.
 const SIX_DEGREES_OF_FREEDOM: u8 = 2;
-/// Codes of STATUS: all is well, and there is no room.
+/// Codes of STATUS: an unknown error, all is well, and there is no room.
+const STATUS_UNKNOWN: u16 = 0;
 const STATUS_OK: u16 = 1;
 const STATUS_BUSY: u16 = 6;
 
 /// The reason why a message has no effect.
 pub(super) enum Refused {
-    /// The message is wrong; the next may be right.
-    Message(String),
+    /// A pose that no probe can have, in a message as it should be.
+    Pose(String),
     /// The client is to be disconnected.
     Client(String),
 }
@@ -50,7 +53,8 @@ pub(super) enum Refused {
 /// Returns whether a message's body is read here; others are skipped, as the protocol demands.
 pub(super) fn is_understood(header: &Header) -> bool {
     let kind = header.kind.text();
-    ["TRANSFORM", "TDATA", "STRING", "COMMAND"].contains(&&*kind) || query(&kind).is_some()
+    let own = ["TRANSFORM", "TDATA", "POSITION", "QTDATA", "STRING", "COMMAND"];
+    own.contains(&&*kind) || query(&kind).is_some()
 }
 
 /// Prefix and type of a query.
@@ -64,21 +68,22 @@ fn query(kind: &str) -> Option<(&str, &str)> {
 /// # Errors
 /// The fault of the message, or of its sender.
 pub(super) fn answer(client: &Client, shared: &Shared, message: &Message) -> Result<(), Refused> {
-    let tracking = &shared.tracking;
     match &message.content {
-        Content::Transform(matrix) => {
-            let taken = tracking.report(message.device, matrix, message);
-            count(shared, taken.map_err(Refused::Message)?);
-            Ok(())
-        }
+        Content::Transform(matrix) => poses(shared, message, [(message.device, *matrix)]),
         Content::Tracking(tools) => {
-            let mut taken = false;
-            for tool in tools {
-                let own = tracking.report(tool.name, &tool.matrix, message);
-                taken |= own.map_err(Refused::Message)?;
-            }
-            count(shared, taken);
-            Ok(())
+            poses(shared, message, tools.iter().map(|tool| (tool.name, tool.matrix)))
+        }
+        Content::Position { place, turn } => {
+            let turn = match turn[..] {
+                [x, y, z, w] => [x, y, z, w],
+                [x, y, z] => [x, y, z, (1.0 - (x * x + y * y + z * z)).max(0.0).sqrt()],
+                _ => [0.0, 0.0, 0.0, 1.0],
+            };
+            poses(shared, message, [(message.device, message::matrix(*place, turn))])
+        }
+        Content::Placed(tools) => {
+            let pose = |tool: &PlacedTool| (tool.name, message::matrix(tool.place, tool.turn));
+            poses(shared, message, tools.iter().map(pose))
         }
         content => match Order::of_message(content) {
             Some(order) => take(client, shared, message, order),
@@ -111,7 +116,25 @@ fn unread() -> Refused {
     Refused::Client("it asks and does not read the answers".to_owned())
 }
 
-fn count(shared: &Shared, taken: bool) {
+/// Takes the poses of tools, each of which may be the one that moves the probe.
+///
+/// # Errors
+/// The fault of the first pose that is none; the others are taken.
+fn poses(
+    shared: &Shared,
+    message: &Message,
+    tools: impl IntoIterator<Item = (Label<20>, [f32; 12])>,
+) -> Result<(), Refused> {
+    let (mut taken, mut fault) = (false, Ok(()));
+    for (tool, matrix) in tools {
+        match shared.tracking.report(tool, &matrix, message) {
+            Ok(true) => taken = true,
+            Ok(false) => shared.count(|status| {
+                status.hear(&format!("{tool} ({})", message.content.kind().text()))
+            }),
+            Err(why) => fault = fault.and(Err(Refused::Pose(why))),
+        }
+    }
     shared.count(|status| match taken {
         true => status.poses += 1,
         false => status.ignored += 1,
@@ -119,6 +142,7 @@ fn count(shared: &Shared, taken: bool) {
     if taken {
         shared.tell();
     }
+    fault
 }
 
 fn reply(client: &Client, shared: &Shared, message: &Message) -> Result<(), Refused> {
@@ -193,11 +217,19 @@ fn status(code: u16, name: &str, text: &str) -> Content {
 /// The present state, for GET_STATUS.
 fn state(shared: &Shared) -> Content {
     let text = match shared.tracking.now() {
-        TrackerState::Never => "no pose has arrived yet",
-        TrackerState::Live(_) => "the tracker moves the probe",
-        TrackerState::Lost(_) => "the tracker is lost",
+        TrackerState::Never => match shared.silent() {
+            Some(text) => text,
+            None => "no pose has arrived yet".to_owned(),
+        },
+        TrackerState::Live(_) => "the tracker moves the probe".to_owned(),
+        TrackerState::Lost(_) => "the tracker is lost".to_owned(),
     };
-    status(STATUS_OK, "OK", text)
+    status(STATUS_OK, "OK", &text)
+}
+
+/// The message to a client that is disconnected for its faults.
+pub(super) fn dismissal(why: &str) -> Vec<u8> {
+    Message::new("", status(STATUS_UNKNOWN, "Disconnected", why)).encode()
 }
 
 /// The message to a client for which there is no room.

@@ -40,6 +40,8 @@ struct Outbox {
     frame: Option<Arc<Published>>,
     wants: Subscriptions,
     tracking_sent: Option<Instant>,
+    /// True where nothing follows the answers that wait.
+    dismissed: bool,
     closed: bool,
 }
 
@@ -82,6 +84,7 @@ impl Client {
                 frame,
                 wants: Subscriptions { image: true, transform: true, tracking: None },
                 tracking_sent: None,
+                dismissed: false,
                 closed: false,
             }),
             changed: Condvar::new(),
@@ -115,6 +118,15 @@ impl Client {
         change(&mut self.outbox.lock().wants);
     }
 
+    /// Sends a last message, and nothing after it.
+    pub fn dismiss(&self, last: Vec<u8>) {
+        let mut outbox = self.outbox.lock();
+        outbox.answers.clear();
+        outbox.answers.push_back(Answer::Message(last));
+        outbox.dismissed = true;
+        self.changed.notify_one();
+    }
+
     /// Ends the connection: both threads return soon.
     pub fn close(&self) {
         self.outbox.lock().closed = true;
@@ -136,6 +148,9 @@ impl Client {
             }
             if let Some(answer) = outbox.answers.pop_front() {
                 return Some(NextMessage::Answer(answer));
+            }
+            if outbox.dismissed {
+                return None;
             }
             if let Some(frame) = outbox.frame.take() {
                 return Some(NextMessage::Frame(frame));
@@ -169,7 +184,12 @@ impl Client {
                 break;
             }
         }
-        self.close();
+        let dismissed = self.outbox.lock().dismissed;
+        match dismissed {
+            // Who receives closes it; it fails where the other side has done so.
+            true => drop(self.stream.shutdown(Shutdown::Write)),
+            false => self.close(),
+        }
     }
 
     fn send(&self, next: NextMessage, shared: &Shared) -> Result<(), ConnectionEnd> {

@@ -8,6 +8,8 @@ use super::wire::{DecodeError, Label, Reader, Timestamp, checksum, put_floats};
 pub const HEADER: usize = 58;
 /// Bytes of a tool in a TDATA message.
 const TOOL_BYTES: usize = 70;
+/// Bytes of a tool in a QTDATA message.
+const PLACED_TOOL_BYTES: usize = 50;
 
 /// The header of every message.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,6 +49,11 @@ impl Header {
         })
     }
 
+    /// Returns whether it states no checksum: 0, which one in 2^64 bodies has.
+    pub fn is_unchecked(&self) -> bool {
+        self.checksum == 0
+    }
+
     fn encode(&self, out: &mut Vec<u8>) {
         out.extend(self.version.to_be_bytes());
         out.extend(self.kind.0);
@@ -83,6 +90,31 @@ pub struct TrackedTool {
     pub matrix: [f32; 12],
 }
 
+/// A tool of a QTDATA message.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlacedTool {
+    /// Name.
+    pub name: Label<20>,
+    /// As of a [`TrackedTool`].
+    pub kind: u8,
+    /// Not used by the protocol.
+    pub reserved: u8,
+    /// Its place, mm.
+    pub place: [f32; 3],
+    /// Its turn, a unit quaternion x, y, z, w.
+    pub turn: [f32; 4],
+}
+
+/// The matrix of a place and a turn, in the form of [`Content::Transform`].
+pub fn matrix(place: [f32; 3], turn: [f32; 4]) -> [f32; 12] {
+    let turn = glam::DQuat::from_array(turn.map(f64::from));
+    // Of no turn at all the rounded length says more than a quaternion of it.
+    let turn = if turn.length() > 0.0 { turn.normalize() } else { turn };
+    let place = glam::DVec3::from(place.map(f64::from));
+    let matrix = glam::DAffine3::from_rotation_translation(turn, place);
+    matrix.to_cols_array().map(|value| value as f32)
+}
+
 /// Content of a message.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Content {
@@ -90,6 +122,16 @@ pub enum Content {
     Transform([f32; 12]),
     /// TDATA: places of tools.
     Tracking(Vec<TrackedTool>),
+    /// POSITION: a place, mm, and a turn, a unit quaternion x, y, z, w. Shorter messages leave out w, which is then not
+    /// negative, or the turn, which is then none.
+    Position {
+        /// The place.
+        place: [f32; 3],
+        /// As much of the turn as there is: 0, 3 or 4 numbers.
+        turn: Vec<f32>,
+    },
+    /// QTDATA: places of tools.
+    Placed(Vec<PlacedTool>),
     /// IMAGE.
     Image(Box<Image>),
     /// STATUS.
@@ -147,6 +189,8 @@ impl Content {
         Label::new(match self {
             Self::Transform(_) => "TRANSFORM",
             Self::Tracking(_) => "TDATA",
+            Self::Position { .. } => "POSITION",
+            Self::Placed(_) => "QTDATA",
             Self::Image(_) => "IMAGE",
             Self::Status { .. } => "STATUS",
             Self::Capability(_) => "CAPABILITY",
@@ -166,6 +210,18 @@ impl Content {
                     out.extend(tool.name.0);
                     out.extend([tool.kind, tool.reserved]);
                     put_floats(out, &tool.matrix);
+                }
+            }
+            Self::Position { place, turn } => {
+                put_floats(out, place);
+                put_floats(out, turn);
+            }
+            Self::Placed(tools) => {
+                for tool in tools {
+                    out.extend(tool.name.0);
+                    out.extend([tool.kind, tool.reserved]);
+                    put_floats(out, &tool.place);
+                    put_floats(out, &tool.turn);
                 }
             }
             Self::Image(image) => image.encode(out),
@@ -220,6 +276,33 @@ impl Content {
                     })
                 });
                 Self::Tracking(tools.collect::<Result<_, _>>()?)
+            }
+            "POSITION" => {
+                let mut from = Reader::new(content, "a POSITION");
+                let place = from.floats()?;
+                let turn = match content.len() {
+                    12 => Vec::new(),
+                    24 => from.floats::<3>()?.to_vec(),
+                    _ => from.floats::<4>()?.to_vec(),
+                };
+                from.end()?;
+                Self::Position { place, turn }
+            }
+            "QTDATA" => {
+                if !content.len().is_multiple_of(PLACED_TOOL_BYTES) {
+                    return Err(odd("a QTDATA"));
+                }
+                let tools = content.chunks_exact(PLACED_TOOL_BYTES).map(|tool| {
+                    let mut from = Reader::new(tool, "a QTDATA");
+                    Ok(PlacedTool {
+                        name: Label(from.array()?),
+                        kind: from.u8()?,
+                        reserved: from.u8()?,
+                        place: from.floats()?,
+                        turn: from.floats()?,
+                    })
+                });
+                Self::Placed(tools.collect::<Result<_, _>>()?)
             }
             "IMAGE" => Self::Image(Box::new(Image::decode(content)?)),
             "STATUS" => {
@@ -317,7 +400,8 @@ impl Message {
             return Err(DecodeError::Length { what: "a body", bytes: body.len() });
         }
         let computed = checksum(body);
-        if computed != header.checksum {
+        // Some senders leave it out, and write 0.
+        if computed != header.checksum && !header.is_unchecked() {
             return Err(DecodeError::Checksum { stated: header.checksum, computed });
         }
         let (extension, content) = match header.version {

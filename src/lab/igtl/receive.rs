@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use super::answer;
 use super::client::{Client, has_left};
 use super::message::{HEADER, Header, Message};
-use super::server::{ServerSettings, Shared};
+use super::server::{LINGER_TIME, ServerSettings, Shared};
 
 /// Most bytes of a message of a type that is read here: a thousand tools.
 const LONGEST_MESSAGE: u64 = 70_000;
@@ -20,6 +20,8 @@ const MOST_FAULTS: u32 = 16;
 enum Fault {
     /// A fault of one message; the next one can be found.
     Message(String),
+    /// A pose that is none, in a message as it should be: trackers send them now and then.
+    Pose(String),
     /// The connection cannot go on.
     Connection(String),
 }
@@ -40,21 +42,39 @@ pub(super) fn receive_all(client: &Client, shared: &Shared) {
             break;
         }
         match fault {
+            Fault::Pose(why) => shared.fault(client, &why),
             Fault::Message(why) => {
                 shared.fault(client, &why);
                 faults += 1;
                 if faults == MOST_FAULTS {
-                    shared.fault(client, &format!("{MOST_FAULTS} faulty messages in a row"));
+                    let count = format!("{MOST_FAULTS} faulty messages in a row");
+                    shared.fault(client, &count);
+                    dismiss(client, &format!("{count}, the last: {why}"));
                     break;
                 }
             }
             Fault::Connection(why) => {
                 shared.fault(client, &why);
+                dismiss(client, &why);
                 break;
             }
         }
     }
     client.close();
+}
+
+/// Tells a client why its connection ends. Its last bytes are read for a while: a connection that is closed over unread
+/// bytes is reset, and the reason would never arrive.
+fn dismiss(client: &Client, why: &str) {
+    client.dismiss(answer::dismissal(why));
+    let (end, mut scratch) = (Instant::now() + LINGER_TIME, [0; 4096]);
+    while Instant::now() < end {
+        match (&client.stream).read(&mut scratch) {
+            Ok(0) => break,
+            Err(error) if !waits(&error) => break,
+            Ok(_) | Err(_) => {}
+        }
+    }
 }
 
 /// Reads the next message; returns false where the connection has ended between two messages.
@@ -71,7 +91,10 @@ fn receive(client: &Client, shared: &Shared) -> Result<bool, Fault> {
             return Err(too_long(&header));
         }
         source.skip(header.body_size)?;
-        shared.count(|status| status.ignored += 1);
+        shared.count(|status| {
+            status.ignored += 1;
+            status.hear(&format!("the type {}, which is not read", header.kind));
+        });
         return Ok(true);
     }
     if header.body_size > LONGEST_MESSAGE {
@@ -81,9 +104,12 @@ fn receive(client: &Client, shared: &Shared) -> Result<bool, Fault> {
     source.fill(&mut body)?;
     let message = Message::decode(&header, &body)
         .map_err(|why| Fault::Message(format!("a message of type {}: {why}", header.kind)))?;
-    shared.count(|status| status.messages += 1);
+    shared.count(|status| {
+        status.messages += 1;
+        status.unchecked += u64::from(header.is_unchecked());
+    });
     answer::answer(client, shared, &message).map_err(|refused| match refused {
-        answer::Refused::Message(why) => Fault::Message(why),
+        answer::Refused::Pose(why) => Fault::Pose(why),
         answer::Refused::Client(why) => Fault::Connection(why),
     })?;
     Ok(true)

@@ -26,7 +26,7 @@ const MOST_REQUESTS: usize = 64;
 /// Most refused clients whose last bytes are read before they are dropped, and for how long: a
 /// connection that is closed over unread bytes is reset, and the refusal would never arrive.
 const MOST_LINGERING: usize = 16;
-const LINGER_TIME: Duration = Duration::from_millis(300);
+pub(super) const LINGER_TIME: Duration = Duration::from_millis(300);
 
 /// The reason why the server cannot run.
 #[derive(Debug, thiserror::Error)]
@@ -102,6 +102,10 @@ pub struct Status {
     pub poses: u64,
     /// Messages of other tools and of types that are skipped.
     pub ignored: u64,
+    /// Tools that move nothing and types that are not read, the first ones that came: `Stylus (TRANSFORM)`.
+    pub others: Vec<String>,
+    /// Messages without a checksum.
+    pub unchecked: u64,
     /// Images that clients took.
     pub images_sent: u64,
     /// Images that were not sent to clients because they were still taking an older one.
@@ -110,6 +114,36 @@ pub struct Status {
     pub errors: u64,
     /// The last of them: client and fault.
     pub last_error: Option<String>,
+}
+
+/// Most tools and types that are kept of those that move nothing.
+const MOST_OTHERS: usize = 8;
+
+impl Status {
+    /// Keeps what has come and moves nothing.
+    pub(super) fn hear(&mut self, what: &str) {
+        if self.others.len() < MOST_OTHERS && !self.others.iter().any(|other| other == what) {
+            self.others.push(what.to_owned());
+        }
+    }
+
+    /// What comes in and moves nothing, where nothing moves the probe: a tool of another name, or of a type that is not
+    /// read. `wanted` is the name that is waited for, where there is one.
+    pub fn silence(&self, wanted: Option<&str>) -> Option<String> {
+        if self.poses > 0 || self.others.is_empty() {
+            return None;
+        }
+        let waited = match wanted {
+            Some(name) => {
+                format!("the [tracker]'s device `{name}` as TRANSFORM, TDATA, POSITION or QTDATA")
+            }
+            None => "a tool as TRANSFORM, TDATA, POSITION or QTDATA".to_owned(),
+        };
+        Some(format!(
+            "nothing moves the probe: {} came, and {waited} is waited for",
+            self.others.join(", ")
+        ))
+    }
 }
 
 /// State shared by all threads.
@@ -138,6 +172,12 @@ impl Shared {
             true => None,
             false => self.latest(),
         }
+    }
+
+    /// Why the probe stays although messages come in.
+    pub fn silent(&self) -> Option<String> {
+        let tracker = self.tracking.tracker();
+        self.status.lock().silence(tracker.device.as_deref())
     }
 
     /// Queues a client's order for the program; returns false where too many wait.
@@ -269,6 +309,11 @@ impl Server {
     /// next client is not sent it unasked.
     pub fn outdate(&self) {
         self.shared.outdated.store(true, Ordering::Relaxed);
+    }
+
+    /// Why the probe stays although messages come in: none of them is the tool that it is to follow.
+    pub fn silent(&self) -> Option<String> {
+        self.shared.silent()
     }
 
     /// Counts of events so far.

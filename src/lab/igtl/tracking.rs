@@ -45,6 +45,15 @@ impl TrackerState {
     }
 }
 
+/// Magnitude from which on a number stands for none: that of NDI's trackers is -3.7e28.
+const NO_NUMBER: f32 = 1e20;
+
+/// Returns whether a matrix is what a tracker sends of a tool that it does not see: numbers that are none, or zeros.
+fn is_gap(matrix: &[f32; 12]) -> bool {
+    let is_none = |value: &f32| !value.is_finite() || value.abs() >= NO_NUMBER;
+    matrix.iter().any(is_none) || matrix[..9].iter().all(|value| *value == 0.0)
+}
+
 /// The latest pose, and the calibration of messages.
 pub(super) struct Tracking {
     tracker: Mutex<Tracker>,
@@ -107,9 +116,9 @@ impl Tracking {
         if !self.is_meant(&device) {
             return Ok(false);
         }
-        // For a tool out of view PLUS sends the last matrix and a status that is not OK.
+        // For a tool out of view PLUS sends the last matrix and a status that is not OK, others no matrix.
         let status = message.metadata("TransformStatus");
-        if status.is_some_and(|status| status != "OK") {
+        if status.is_some_and(|status| status != "OK") || is_gap(matrix) {
             if let Some(last) = &mut *self.last.lock() {
                 last.missing |= last.pose.device == device;
             }

@@ -110,6 +110,9 @@ fn network(ui: &mut Ui, inputs: &mut Inputs) {
     if !report.address.ip().is_loopback() {
         ui.label(RichText::new(OPEN).color(style::WARN));
     }
+    if let Some(silence) = &report.silence {
+        ui.label(RichText::new(silence).color(style::WARN));
+    }
     if let Some(last) = &status.last_error {
         let text = format!("{} faults, the last: {last}", status.errors);
         ui.label(RichText::new(text).color(style::FAINT));
