@@ -10,7 +10,7 @@ mod bins;
 
 use std::collections::VecDeque;
 
-use glam::{DVec3, Vec3A};
+use glam::{BVec3A, Vec3A};
 use obvhs::{
     aabb::Aabb,
     bvh2::{Bvh2, node::Bvh2Node},
@@ -232,35 +232,48 @@ impl Builder<'_> {
     /// that only touches the plane belongs to the side on which it lies.
     fn clip(&self, part: &TrianglePart, axis: usize, plane: f32) -> [Aabb; 2] {
         let bounds = &part.bounds;
-        if bounds.max[axis] <= plane {
+        if bounds.max.to_array()[axis] <= plane {
             return [*bounds, Aabb::INVALID];
         }
-        if bounds.min[axis] >= plane {
+        if bounds.min.to_array()[axis] >= plane {
             return [Aabb::INVALID, *bounds];
         }
         let corners = self.triangles[part.triangle as usize].map(|v| self.positions[v as usize]);
-        let mut sides = [Aabb::INVALID; 2];
-        for (i, &a) in corners.iter().enumerate() {
-            let b = corners[(i + 1) % 3];
-            if a[axis] <= plane {
-                sides[0].extend(a.into());
+        let along = corners.map(|corner| corner[axis]);
+        let corners = corners.map(Vec3A::from);
+        let [mut left, mut right] = [Aabb::INVALID; 2];
+        for (i, j) in [(0, 1), (1, 2), (2, 0)] {
+            if along[i] <= plane {
+                left.extend(corners[i]);
             }
-            if a[axis] >= plane {
-                sides[1].extend(a.into());
+            if along[i] >= plane {
+                right.extend(corners[i]);
             }
-            if (a[axis] < plane) != (b[axis] < plane) && a[axis] != plane && b[axis] != plane {
-                let met = crossing(a, b, axis, plane);
-                sides = sides.map(|side| side.union(&met));
+            if (along[i] < plane && along[j] > plane) || (along[i] > plane && along[j] < plane) {
+                let share = (plane - along[i]) / (along[j] - along[i]);
+                let met = crossing(corners[i], corners[j], share);
+                (left, right) = (left.union(&met), right.union(&met));
             }
         }
-        sides[0].max[axis] = plane;
-        sides[1].min[axis] = plane;
-        sides.map(|side| {
+        let at_plane = Vec3A::splat(plane);
+        left.max = Vec3A::select(AXES[axis], at_plane, left.max);
+        right.min = Vec3A::select(AXES[axis], at_plane, right.min);
+        [left, right].map(|side| {
             let inside = side.intersection(bounds);
-            if inside.valid() { inside } else { Aabb::INVALID }
+            match inside.min.cmple(inside.max).all() {
+                true => inside,
+                false => Aabb::INVALID,
+            }
         })
     }
 }
+
+/// Masks of the axes.
+const AXES: [BVec3A; 3] = [
+    BVec3A::new(true, false, false),
+    BVec3A::new(false, true, false),
+    BVec3A::new(false, false, true),
+];
 
 fn centres(parts: &[TrianglePart]) -> Aabb {
     let centres = parts.iter().map(|part| part.bounds.center());
@@ -283,16 +296,13 @@ fn by_objects(parts: &[TrianglePart], centres: &Aabb) -> Option<Division> {
     cheapest((0..3).filter_map(along))
 }
 
-/// A box that contains the intersection of an edge with a plane, within the rounding of single precision.
-fn crossing(a: [f32; 3], b: [f32; 3], axis: usize, plane: f32) -> Aabb {
-    let [a, b] = [a, b].map(|p| DVec3::from(p.map(f64::from)));
-    let share = (f64::from(plane) - a[axis]) / (b[axis] - a[axis]);
+/// A box that contains the place at a share of the way from `a` to `b`, whatever the rounding of single precision.
+fn crossing(a: Vec3A, b: Vec3A, share: f32) -> Aabb {
     let met = a + share * (b - a);
-    // Twice the rounding of the sum in f64; then that of the conversion.
-    let error = 4.0 * f64::EPSILON * a.abs().max(b.abs());
-    let low = (met - error).to_array().map(|x| (x as f32).next_down());
-    let high = (met + error).to_array().map(|x| (x as f32).next_up());
-    Aabb::new(low.into(), high.into())
+    // The share is off by 1.5 of its last places, the difference by half of one and up to twice the larger coordinate, the
+    // product and the sum by half of one each: 5.5 epsilon of the larger coordinate in all.
+    let error = 8.0 * f32::EPSILON * a.abs().max(b.abs());
+    Aabb::new(met - error, met + error)
 }
 
 #[cfg(test)]

@@ -1,5 +1,7 @@
 //! Tests of trees whose triangles are cut: the leaves must cover every triangle.
 
+use glam::DVec3;
+
 use super::*;
 use crate::scene::{Mesh, shapes};
 
