@@ -12,6 +12,41 @@ use insonify::volume::{
 
 use crate::common::program::insonify;
 
+/// Frames of several sizes of pixels, as after a change of depth while PLUS records: told by `check`, and no volume.
+#[test]
+fn a_change_of_depth_is_told_and_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut frames = sweep([13, 9], calibration(), &planes(6, 2.0));
+    let mut said = Vec::new();
+    for later in ["0.1 0.0386 1", "0.2 0.0772 1", "0.10000000000000000555 0.03860000000000000042 1"]
+    {
+        for (index, frame) in frames.frames.iter_mut().enumerate() {
+            let size = if index < 3 { "0.1 0.0386 1" } else { later };
+            frame.fields = vec![("ElementSpacing".to_owned(), size.to_owned())];
+        }
+        frames.write(&folder.path().join("s.seq.mha")).expect("written");
+        let (done, report) = insonify(folder.path(), &["check", "s.seq.mha"]);
+        assert!(done, "{report}");
+        let args = ["reconstruct", "s.seq.mha", "-o", "v.mha", "--image-to-probe"];
+        let args = [&args[..], &["0.5 0 0 0 0 0.25 0 0 0 0 1 0 0 0 0 1"]].concat();
+        let (made, error) = insonify(folder.path(), &args);
+        said.push((report, made, error.split_whitespace().collect::<Vec<_>>().join(" ")));
+    }
+    for (report, made, error) in [&said[0], &said[2]] {
+        assert!(
+            *made && report.contains("frames state pixels of 0.1 x 0.0386 mm pose"),
+            "{report} {error}"
+        );
+    }
+    let told = "pixels of 0.1 x 0.0386 mm, from frame 3 on of 0.2 x 0.0772 mm";
+    let (report, made, error) = &said[1];
+    assert!(report.contains(told), "{report}");
+    assert!(
+        !made && error.contains("from frame 3 on of 0.2") && error.contains("of their own"),
+        "{error}"
+    );
+}
+
 /// A field linear in space.
 fn field(at: DVec3) -> f64 {
     20.0 + 3.0 * at.x - 2.0 * at.y + 5.0 * at.z

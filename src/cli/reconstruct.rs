@@ -108,6 +108,7 @@ pub fn run(args: &Reconstruct) -> Result<()> {
     writable(&args.output)?;
     let (mut sequence, warnings) = Sequence::load(&args.sequence)?;
     notes(&warnings);
+    sequence.has_one_pixel_size(&args.sequence)?;
     let config = args.config.as_deref().map(Config::load).transpose()?;
     let mut config = config.unwrap_or_else(|| Config {
         transforms: Transforms::default(),

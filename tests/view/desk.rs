@@ -486,6 +486,19 @@ impl Desk {
         1024 * value.expect("a size")
     }
 
+    /// Discards what is not saved once that is asked, and waits until something is so. Before the question the key has no
+    /// meaning, and whether the question is there yet a picture does not say.
+    pub fn discard(&mut self, what: &str, mut is_so: impl FnMut(&mut Self) -> bool) {
+        let mut pressed = Instant::now();
+        self.wait_for(what, |desk| {
+            if pressed.elapsed() > Duration::from_millis(200) {
+                desk.hold_control(Key::Letter('d'));
+                pressed = Instant::now();
+            }
+            is_so(desk)
+        });
+    }
+
     /// Presses Ctrl+Q, and discards what is not saved; asserts that the program ends by itself, without an error.
     pub fn quit(mut self) {
         self.hold_control(Key::Letter('q'));

@@ -74,7 +74,8 @@ fn every_way_out_asks_and_saving_keeps_settings_trajectory_and_measurements() {
 
 #[test]
 fn another_scene_opens_by_enter_and_a_dialog_keeps_the_keyboard() {
-    let other = "name = \"Water\"\n# mine\n";
+    // Black, whatever the quality of its image: noise is lowered, too.
+    let other = "name = \"Water\"\n# mine\n[imaging]\ngain = -60\n";
     let Some(mut desk) = open(SCENE, &[("water.toml", other)]) else {
         return;
     };
@@ -113,9 +114,7 @@ fn another_scene_opens_by_enter_and_a_dialog_keeps_the_keyboard() {
     desk.retype("water.toml");
     desk.still(CENTRE);
     desk.press(Key::Enter);
-    desk.still(CENTRE);
-    desk.hold_control(Key::Letter('d'));
-    desk.wait_for("the other scene", |d| brightness(&d.grab([60, 300, 300, 200])) < 5.0);
+    desk.discard("the other scene", |d| brightness(&d.grab([60, 300, 300, 200])) < 5.0);
     desk.quit();
 }
 

@@ -16,6 +16,10 @@ const IMAGE_STATUS: &str = "ImageStatus";
 /// The same as PLUS names it in NRRD.
 const PLUS_STATUS: &str = "Status";
 const TIMESTAMP: &str = "Timestamp";
+const SPACING: &str = "ElementSpacing";
+
+/// Relative difference of sizes of pixels that are the same.
+const SAME_PIXEL: f64 = 1e-6;
 
 /// A measured transform, and whether it is valid.
 #[derive(Clone, Debug, PartialEq)]
@@ -59,6 +63,13 @@ impl TrackedFrame {
         self.image != Some(false)
     }
 
+    /// Size of a pixel, mm, where the frame states its own: PLUS does where the depth may be changed.
+    pub fn pixel(&self) -> Option<[f64; 2]> {
+        let (_, value) = self.fields.iter().find(|(name, _)| name == SPACING)?;
+        let mut numbers = value.split_whitespace().map(|word| word.parse::<f64>().ok());
+        Some([numbers.next()??, numbers.next()??])
+    }
+
     /// Keys and values of frame `index` in a header.
     pub(super) fn entries(&self, index: usize) -> Vec<(String, String)> {
         let mut out = Vec::new();
@@ -87,6 +98,30 @@ impl TrackedFrame {
         }
         out
     }
+}
+
+/// The sizes of pixels that frames state, each with the number of the first frame that has it.
+pub(super) fn pixels<'f>(
+    frames: impl Iterator<Item = (usize, &'f TrackedFrame)>,
+) -> Vec<(usize, [f64; 2])> {
+    let mut out: Vec<(usize, [f64; 2])> = Vec::new();
+    for (index, size) in frames.filter_map(|(index, frame)| Some((index, frame.pixel()?))) {
+        let same = |&(_, last): &(usize, [f64; 2])| {
+            last.iter().zip(size).all(|(a, b)| (a - b).abs() <= SAME_PIXEL * b.abs())
+        };
+        if !out.last().is_some_and(same) {
+            out.push((index, size));
+        }
+    }
+    out
+}
+
+/// Sizes of pixels in words: "pixels of 0.1 x 0.1 mm, from frame 3 on of 0.2 x 0.2 mm".
+pub(super) fn pixels_told(sizes: &[(usize, [f64; 2])]) -> Option<String> {
+    let [(_, first), later @ ..] = sizes else { return None };
+    let told = |[x, y]: [f64; 2]| format!("{x} x {y} mm");
+    let later = later.iter().map(|(at, size)| format!(", from frame {at} on of {}", told(*size)));
+    Some(format!("pixels of {}{}", told(*first), later.collect::<String>()))
 }
 
 /// Returns whether the third axis is declared to be of space.

@@ -17,6 +17,8 @@ pub struct Summary {
     pub poses: BTreeMap<String, [usize; 2]>,
     /// First and last timestamp, seconds.
     pub times: Option<[f64; 2]>,
+    /// Sizes of pixels that frames state, in words.
+    pub pixels: Option<String>,
 }
 
 impl Summary {
@@ -55,7 +57,9 @@ impl Summary {
             let [low, high] = range.unwrap_or([t, t]);
             Some([low.min(t), high.max(t)])
         });
-        Ok(Some(Self { frames: count, poses, times }))
+        let sizes = frames::pixels(frames.iter().map(|(index, frame)| (*index, frame)));
+        let pixels = frames::pixels_told(&sizes);
+        Ok(Some(Self { frames: count, poses, times, pixels }))
     }
 }
 
@@ -64,6 +68,9 @@ impl fmt::Display for Summary {
         write!(f, "  tracked sequence of {} frames", self.frames)?;
         if let Some([first, last]) = self.times {
             write!(f, ", {first} s to {last} s")?;
+        }
+        if let Some(pixels) = &self.pixels {
+            write!(f, "\n  frames state {pixels}")?;
         }
         for (name, [all, ok]) in &self.poses {
             write!(f, "\n  pose {name}: {all}, {ok} of them OK")?;
