@@ -24,7 +24,6 @@ def samples(folder: str, split: str, seed: int):
     tars = sorted(str(path) for path in Path(folder, "webdataset").glob(f"{split}-*.tar"))
 
     def arrays(sample: dict) -> tuple[np.ndarray, np.ndarray]:
-        # By hand: decoders make colours of the mask's palette.
         image, mask = (np.asarray(Image.open(io.BytesIO(sample[key]))) for key in ("png", "seg.png"))
         return image.astype(np.float32)[None] / 255, mask.astype(np.int64)
 

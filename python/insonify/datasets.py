@@ -24,7 +24,8 @@ def make_dataset(
 
     resume: goes on with what a stopped run left of the shard; where there is nothing, it begins.
     check: only checks the plan. heard(done, samples) is called after each sample; what it raises ends the run.
-    Returns samples, parts, made, kept, sheet (the path of the contact sheet; None without parts), classes, warnings.
+    Returns samples, parts, made, kept, sheet (the path of the contact sheet; None without parts), classes, their colours
+    (red, green and blue of each), warnings.
     SceneError: a mistake in the plan, before any frame is made. InsonifyError: no room, no device.
     """
     return _insonify.make_dataset(plan, output, shard, resume, check, device, tracer, heard or (lambda done, samples: None))

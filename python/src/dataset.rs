@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use insonify::dataset::{DatasetError, Plan, Run, Store, Told};
+use insonify::dataset::{DatasetError, Plan, Run, Store, Told, colours};
 use insonify::issue::told;
 use insonify::sim::Tracer;
 use pyo3::prelude::*;
@@ -85,6 +85,10 @@ pub fn make_dataset<'py>(
     out.set_item("kept", kept)?;
     out.set_item("sheet", sheet)?;
     out.set_item("classes", plan.classes.clone())?;
+    out.set_item(
+        "colours",
+        colours(&plan).into_iter().map(|colour| colour.map(u32::from)).collect::<Vec<_>>(),
+    )?;
     out.set_item("warnings", warnings.iter().map(ToString::to_string).collect::<Vec<_>>())?;
     Ok(out)
 }

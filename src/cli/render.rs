@@ -61,7 +61,7 @@ pub struct Render {
     common: Common,
     /// Writes what every sample and every pixel shows, for each frame. NAME.npz: all arrays of docs/labels.md (tissue and
     /// mesh that are there and that are seen, position, loss, incidence, displacement, contact, expected level,
-    /// reverberation), the legend in legend.json. NAME.png: the tissue that is seen, as an index with a colour; 255
+    /// reverberation), the legend in legend.json. NAME.png: the tissue that is seen, as a grey level, with NAME.colours.png beside it; 255
     /// is outside. Several frames are numbered as images are.
     #[arg(long, value_name = "FILE")]
     labels: Option<PathBuf>,

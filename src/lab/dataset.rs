@@ -29,6 +29,7 @@ mod store;
 mod studio;
 mod tables;
 
+pub use members::colours;
 pub use plan::{Array, Format, Part, Plan, Sample, Segmented, Split};
 pub use run::Run;
 pub use sheet::Gallery;

@@ -119,7 +119,7 @@ fn labels_are_the_tissue_at_each_pixel() {
         let mut decoder = png::Decoder::new(std::io::Cursor::new(&bytes));
         decoder.set_transformations(png::Transformations::IDENTITY);
         let mut reader = decoder.read_info().expect("a PNG");
-        assert_eq!(reader.info().color_type, png::ColorType::Indexed);
+        assert_eq!(reader.info().color_type, png::ColorType::Grayscale);
         let (width, height) = (reader.info().width, reader.info().height);
         let mut pixels = vec![0; (width * height) as usize];
         reader.next_frame(&mut pixels).expect("pixels");

@@ -60,13 +60,19 @@ fn an_image_of_indices_shows_the_tissues() {
     let dir = tempfile::tempdir().expect("a folder");
     let (well, said) = render(dir.path(), &["--labels", "seen.png"]);
     assert!(well, "{said}");
-    let shown = image::open(dir.path().join("seen.png")).expect("a PNG").into_rgba8();
+    let plain = image::open(dir.path().join("seen.png")).expect("a PNG");
+    assert_eq!(plain.color(), image::ColorType::L8, "numbers that no reader takes for colours");
+    let mut numbers = plain.into_luma8().into_raw();
+    numbers.sort_unstable();
+    numbers.dedup();
+    assert!(numbers.len() > 4 && numbers.last() == Some(&255), "{numbers:?}");
+    let shown = image::open(dir.path().join("seen.colours.png")).expect("a PNG").into_rgba8();
     assert_eq!(shown.height(), 90);
     assert_eq!(shown.get_pixel(0, 0).0[3], 0, "outside the sector");
     let mut colours: Vec<_> = shown.pixels().filter(|p| p.0[3] == 255).map(|p| p.0).collect();
     colours.sort_unstable();
     colours.dedup();
-    assert!(colours.len() > 4, "{colours:?}");
+    assert_eq!(colours.len(), numbers.len() - 1, "{colours:?} {numbers:?}");
 }
 
 #[test]

@@ -1,4 +1,5 @@
-//! Images of indices (PNG with a palette): a program reads numbers, a viewer shows colours.
+//! Images of indices, as PNG: of 8-bit grey levels, which every program reads as the numbers that they are, or with a
+//! palette, in which a viewer shows colours. Programs that take a palette's colours for grey levels read other numbers.
 
 use std::path::Path;
 
@@ -6,6 +7,31 @@ use super::files;
 
 /// The index of pixels that show nothing; transparent.
 pub const NOTHING: u8 = 255;
+
+/// A PNG file of `indices` as 8-bit grey levels, row by row, with a `text` under the keyword `insonify`; `size` is width and
+/// height.
+///
+/// # Panics
+/// When there is not one index per pixel.
+pub fn plain([width, height]: [u32; 2], indices: &[u8], text: &str) -> Vec<u8> {
+    let mut out = Vec::new();
+    let mut encoder = png::Encoder::new(&mut out, width, height);
+    encoder.set_color(png::ColorType::Grayscale);
+    finished(encoder, indices, text);
+    out
+}
+
+/// Writes an image's indices.
+fn finished(mut encoder: png::Encoder<'_, &mut Vec<u8>>, indices: &[u8], text: &str) {
+    encoder.set_depth(png::BitDepth::Eight);
+    let added = encoder.add_itxt_chunk("insonify".into(), text.into());
+    added.expect("nothing is written yet");
+    let written = encoder.write_header().and_then(|mut writer| {
+        writer.write_image_data(indices)?;
+        writer.finish()
+    });
+    written.expect("one byte per pixel, into memory");
+}
 
 /// Writes [`bytes`] as the file `path`, whole or not at all.
 ///
@@ -47,22 +73,23 @@ pub fn bytes(
     let mut out = Vec::new();
     let mut encoder = png::Encoder::new(&mut out, width, height);
     encoder.set_color(png::ColorType::Indexed);
-    encoder.set_depth(png::BitDepth::Eight);
     encoder.set_palette(palette);
     encoder.set_trns(&opacity[..]);
-    let added = encoder.add_itxt_chunk("insonify".into(), text.into());
-    added.expect("nothing is written yet");
-    let written = encoder.write_header().and_then(|mut writer| {
-        writer.write_image_data(indices)?;
-        writer.finish()
-    });
-    written.expect("one byte per pixel, into memory");
+    finished(encoder, indices, text);
     out
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn plain_numbers_are_those_that_every_reader_has() {
+        let file = plain([3, 1], &[1, NOTHING, 0], "{}");
+        let shown = image::load_from_memory(&file).unwrap();
+        assert_eq!(shown.color(), image::ColorType::L8);
+        assert_eq!(shown.into_luma8().into_raw(), [1, NOTHING, 0]);
+    }
 
     #[test]
     fn numbers_and_colours_come_back() {

@@ -6,10 +6,10 @@ use miette::{IntoDiagnostic, Result, miette};
 
 use crate::cli::common;
 use crate::cli::images::Images;
-use insonify::output;
 use insonify::output::indexed::{self, NOTHING};
 use insonify::output::npy::Element;
 use insonify::output::npz::{self, Entry};
+use insonify::output::{self, files};
 use insonify::scene::Scene;
 use insonify::sim::Simulator;
 use insonify::sim::labels::{self, LabelArray, LabelGrid, LabelValues, Labels};
@@ -112,5 +112,7 @@ fn image(path: &Path, pixels: &LabelGrid, scene: &Scene, legend: &str) -> std::i
     let index = |tissue: u32| if tissue == NONE { NOTHING } else { tissue as u8 };
     let indices: Vec<u8> = pixels.labels.iter().map(|label| index(label.tissue)).collect();
     let [height, width] = pixels.shape.map(|n| n as u32);
-    indexed::write(path, [width, height], &indices, &labels::colours(scene), legend)
+    files::replace(path, &indexed::plain([width, height], &indices, legend))?;
+    let colours = path.with_extension("colours.png");
+    indexed::write(&colours, [width, height], &indices, &labels::colours(scene), legend)
 }

@@ -80,15 +80,15 @@ fn grey(made: &Made) -> Vec<u8> {
     out
 }
 
-/// The segmentation as a PNG file whose pixels are classes, with their colours and names.
+/// The segmentation as a PNG file whose grey levels are classes, with their names and colours as text.
 fn indexed(plan: &Plan, made: &Made) -> Vec<u8> {
     let (width, height) = made.image.dimensions();
-    let legend = json!({ "classes": plan.classes }).to_string();
-    indexed::bytes([width, height], &made.segmentation, &colours(plan), &legend)
+    let legend = json!({ "classes": plan.classes, "colours": colours(plan) }).to_string();
+    indexed::plain([width, height], &made.segmentation, &legend)
 }
 
 /// The colour of each class.
-pub(super) fn colours(plan: &Plan) -> Vec<[u8; 3]> {
+pub fn colours(plan: &Plan) -> Vec<[u8; 3]> {
     let numbered = plan.classes.iter().enumerate();
     numbered.map(|(i, name)| palette::look(name, i).0).collect()
 }

@@ -380,7 +380,7 @@ impl<'p> Store<'p> {
     }
 }
 
-/// The bytes of a PNG file's pixels, as they are: grey levels, or places in its palette.
+/// The grey levels of a PNG file's pixels.
 fn picture(bytes: &[u8]) -> Result<GrayImage, png::DecodingError> {
     let mut decoder = png::Decoder::new(std::io::Cursor::new(bytes));
     decoder.set_transformations(png::Transformations::IDENTITY);
