@@ -10,12 +10,15 @@ mod arrays;
 mod dataset;
 mod error;
 mod frame;
+mod pickle;
 mod process;
 mod running;
 mod save;
 mod scene;
 mod simulator;
+mod state;
 mod toml;
+mod written;
 
 use insonify::gpu;
 use pyo3::prelude::*;
@@ -70,7 +73,7 @@ fn _insonify(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<scene::Scene>()?;
     module.add_class::<simulator::Simulator>()?;
     module.add_class::<frame::Frame>()?;
-    module.add_function(wrap_pyfunction!(scene::again, module)?)?;
+    module.add_function(wrap_pyfunction!(pickle::again, module)?)?;
     module.add_function(wrap_pyfunction!(dataset::make_dataset, module)?)?;
     module.add_function(wrap_pyfunction!(save::save, module)?)?;
     module.add_function(wrap_pyfunction!(devices, module)?)?;

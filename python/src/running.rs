@@ -16,7 +16,7 @@ use pyo3::prelude::*;
 
 use crate::error::{InsonifyError, raised};
 use crate::frame::{Contents, Kind, Picture};
-use crate::scene::State;
+use crate::state::State;
 
 /// What an image is taken with, where it is not the scene's own.
 #[derive(Clone, Copy, Default)]

@@ -4,156 +4,18 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use glam::DAffine3;
-use insonify::scene::file::{self, SceneFile, quoted};
-use insonify::scene::mesh::Surface;
-use insonify::scene::{self, Warning, shipped};
-use pyo3::exceptions::{PyKeyError, PyTypeError, PyValueError};
+use insonify::scene::file::{self, SceneFile};
+use insonify::scene::shipped;
+use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyIterator, PyList, PyTuple};
 
 use crate::arrays;
-use crate::error::{SceneError, mistaken, unusable};
+use crate::error::{SceneError, mistaken};
+use crate::pickle;
+use crate::state::State;
 use crate::toml;
-
-/// A mesh that a program has given as arrays.
-struct Given {
-    surface: Surface,
-    mesh: Arc<scene::Mesh>,
-    positions: Vec<[f32; 3]>,
-    triangles: Vec<[u32; 3]>,
-    cap_openings: bool,
-    /// What is to be said of it.
-    warnings: Vec<String>,
-}
-
-impl Given {
-    fn new(
-        name: &str,
-        positions: Vec<[f32; 3]>,
-        triangles: Vec<[u32; 3]>,
-        cap_openings: bool,
-    ) -> PyResult<Self> {
-        let made = Surface::new(name, positions.clone(), triangles.clone(), cap_openings);
-        let (surface, mesh, issues) = made.map_err(|issues| unusable(name, &issues))?;
-        let warnings = texts(&issues);
-        Ok(Self { surface, mesh: mesh.into(), positions, triangles, cap_openings, warnings })
-    }
-}
-
-/// A scene with everything that a program has changed in it.
-#[derive(Clone)]
-pub struct State {
-    file: SceneFile,
-    /// What was put in place of the file's entries.
-    entries: Vec<(String, String)>,
-    pub scene: scene::Scene,
-    warnings: Vec<String>,
-    /// How many times the anatomy was read; simulators upload it again when it has grown.
-    pub generation: u64,
-    given: BTreeMap<String, Arc<Given>>,
-    /// Where the vertices of given meshes are, where that is not as they were given.
-    moved: BTreeMap<String, Vec<[f32; 3]>>,
-    /// Placements that a program gave, by instance, each with the one before: the graph of the scene has no say in them.
-    placed: BTreeMap<usize, [DAffine3; 2]>,
-    /// The pose that a program gave.
-    pose: Option<DAffine3>,
-    pub time: f64,
-}
-
-impl State {
-    fn new(
-        file: SceneFile,
-        entries: Vec<(String, String)>,
-        given: BTreeMap<String, Arc<Given>>,
-    ) -> Result<Self, file::SceneError> {
-        let mut file = file;
-        given.iter().for_each(|(name, mesh)| file.give(name, Arc::clone(&mesh.mesh)));
-        let (scene, warnings) = file.load(&entries)?;
-        Ok(Self {
-            file,
-            entries,
-            scene,
-            warnings: texts(&warnings),
-            generation: 0,
-            given,
-            moved: BTreeMap::new(),
-            placed: BTreeMap::new(),
-            pose: None,
-            time: 0.0,
-        })
-    }
-
-    /// Puts a value at a path; none takes back what was put there.
-    fn set(&mut self, path: &str, value: Option<String>) -> Result<(), file::SceneError> {
-        let mut entries = self.entries.clone();
-        entries.retain(|(put, _)| put != path);
-        entries.extend(value.map(|value| (path.to_owned(), value)));
-        if SceneFile::is_light(path) {
-            self.file.put(&entries, &mut self.scene)?;
-        } else {
-            let (scene, warnings) = self.file.load(&entries)?;
-            self.scene = scene;
-            self.warnings = texts(&warnings);
-            self.generation += 1;
-        }
-        self.entries = entries;
-        if path.starts_with("probe.pose") {
-            self.pose = None;
-        }
-        if let Some(pose) = self.pose {
-            self.scene.world_from_probe = pose;
-        }
-        self.at(self.time);
-        Ok(())
-    }
-
-    /// Sets everything to its state at `seconds`.
-    pub fn at(&mut self, seconds: f64) {
-        self.scene.set_time(seconds);
-        for (&instance, &[placement, _]) in &self.placed {
-            self.scene.instances[instance].world_from_object = placement;
-        }
-    }
-
-    /// Paths of the keys that were set by hand.
-    pub fn by_hand(&self) -> impl Iterator<Item = &str> {
-        self.entries.iter().map(|(path, _)| path.as_str())
-    }
-
-    fn reshape(&mut self, name: &str, positions: &[[f32; 3]]) -> PyResult<()> {
-        let instance = self.instance(name)?;
-        let given = self.given.get(name).ok_or_else(|| {
-            PyValueError::new_err(format!(
-                "mesh `{name}` is that of a file; only meshes made of arrays take other vertices"
-            ))
-        })?;
-        if positions.len() != given.positions.len() {
-            let (wanted, own) = (positions.len(), given.positions.len());
-            return Err(PyValueError::new_err(format!(
-                "mesh `{name}` has {own} vertices, not {wanted}"
-            )));
-        }
-        let shape = Arc::new(given.surface.shape(positions));
-        self.moved.insert(name.to_owned(), positions.to_vec());
-        self.file.give(name, Arc::clone(&shape));
-        self.scene.reshape(instance, shape);
-        Ok(())
-    }
-
-    fn instance(&self, name: &str) -> PyResult<usize> {
-        let found = self.scene.instances.iter().position(|i| i.name == name);
-        found.ok_or_else(|| {
-            let names = self.scene.instances.iter().map(|i| i.name.as_str());
-            let remedy = insonify::settings::suggest::among(name, names);
-            PyKeyError::new_err(format!("the scene has no mesh `{name}`; {remedy}"))
-        })
-    }
-}
-
-fn texts(warnings: &[Warning]) -> Vec<String> {
-    warnings.iter().map(Warning::to_string).collect()
-}
+use crate::written::Written;
 
 /// What is imaged: anatomy, tissues, probe and every setting of the manual (docs/scenes.md).
 ///
@@ -182,101 +44,9 @@ impl Scene {
         self.state.lock_py_attached(py).unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn made(state: Result<State, file::SceneError>) -> PyResult<Self> {
+    pub fn made(state: Result<State, file::SceneError>) -> PyResult<Self> {
         let state = state.map_err(|e| mistaken(&e))?;
         Ok(Self { state: Arc::new(Mutex::new(state)) })
-    }
-}
-
-/// The text of a scene file for keyword arguments, and the meshes among them that are arrays.
-struct Written {
-    text: String,
-    given: BTreeMap<String, Arc<Given>>,
-}
-
-impl Written {
-    fn new(tables: &Bound<'_, PyDict>) -> PyResult<Self> {
-        let mut out = Self { text: String::new(), given: BTreeMap::new() };
-        let lists = ["mesh", "wire", "group", "transform", "selector"];
-        let mut behind = String::new();
-        for (key, value) in tables {
-            let key: String = key.extract()?;
-            if !lists.contains(&key.as_str()) {
-                out.text += &format!("{} = {}\n", quoted(&key), toml::text(&value)?);
-                continue;
-            }
-            for table in out.elements(&key, &value)? {
-                behind += &format!("[[{key}]]\n");
-                for (key, value) in toml::entries(&table)? {
-                    behind += &format!("{} = {value}\n", quoted(&key));
-                }
-            }
-        }
-        out.text += &behind;
-        Ok(out)
-    }
-
-    /// The elements of a list of tables: given as a list, or as a dictionary by name. Arrays of meshes are taken out.
-    fn elements<'py>(
-        &mut self,
-        key: &str,
-        value: &Bound<'py, PyAny>,
-    ) -> PyResult<Vec<Bound<'py, PyDict>>> {
-        let wrong = |_| {
-            PyTypeError::new_err(format!("{key} is a dict of dicts by name, or a list of dicts"))
-        };
-        let mut out = Vec::new();
-        if let Ok(by_name) = value.cast::<PyDict>() {
-            for (name, table) in by_name {
-                let table =
-                    table.cast_into::<PyDict>().map_err(|e| wrong(e.into_inner()))?.copy()?;
-                table.set_item("name", name)?;
-                out.push(table);
-            }
-        } else {
-            let list = value.cast::<PyList>().map_err(|_| wrong(value.clone()))?;
-            for table in list {
-                out.push(table.cast_into::<PyDict>().map_err(|e| wrong(e.into_inner()))?.copy()?);
-            }
-        }
-        if key == "mesh" {
-            out.iter().try_for_each(|table| self.surface(table))?;
-        }
-        Ok(out)
-    }
-
-    fn surface(&mut self, table: &Bound<'_, PyDict>) -> PyResult<()> {
-        let take = |key: &str| {
-            let value = table.get_item(key)?;
-            if value.is_some() {
-                table.del_item(key)?;
-            }
-            PyResult::Ok(value)
-        };
-        let (vertices, triangles) = match (take("vertices")?, take("triangles")?) {
-            (None, None) => return Ok(()),
-            (Some(vertices), Some(triangles)) => (vertices, triangles),
-            _ => {
-                return Err(PyValueError::new_err(
-                    "a mesh has both `vertices` and `triangles`, or neither",
-                ));
-            }
-        };
-        let capped = take("cap_openings")?.map_or(Ok(false), |flag| flag.extract())?;
-        let name: String = match table.get_item("name")? {
-            Some(name) => name.extract()?,
-            None => return Err(PyValueError::new_err("a mesh needs a `name`")),
-        };
-        let positions = arrays::positions(&vertices)?;
-        let triangles = arrays::triangles(&triangles)?;
-        if take("units")?.is_some() {
-            return Err(PyValueError::new_err(format!(
-                "mesh `{name}` has `units` beside `vertices`, which are in mm: multiply them"
-            )));
-        }
-        let given = table.py().detach(|| Given::new(&name, positions, triangles, capped))?;
-        self.given.insert(name, Arc::new(given));
-        Ok(())
     }
 }
 
@@ -427,7 +197,7 @@ impl Scene {
     }
 
     #[setter]
-    fn set_time(&self, py: Python<'_>, seconds: f64) -> PyResult<()> {
+    pub fn set_time(&self, py: Python<'_>, seconds: f64) -> PyResult<()> {
         let seconds = crate::simulator::seconds(seconds)?;
         let mut state = self.lock(py);
         state.time = seconds;
@@ -444,7 +214,7 @@ impl Scene {
     }
 
     #[setter]
-    fn set_pose(&self, py: Python<'_>, pose: &Bound<'_, PyAny>) -> PyResult<()> {
+    pub fn set_pose(&self, py: Python<'_>, pose: &Bound<'_, PyAny>) -> PyResult<()> {
         let pose = arrays::pose(pose)?;
         let mut state = self.lock(py);
         state.pose = Some(pose);
@@ -454,7 +224,7 @@ impl Scene {
 
     /// Moves the vertices [N, 3] (mm) of a mesh that was made of arrays; its tissue moves along. The next frame
     /// shows it without reading or building anything anew.
-    fn set_vertices(
+    pub fn set_vertices(
         &self,
         py: Python<'_>,
         mesh: &str,
@@ -475,7 +245,7 @@ impl Scene {
     }
 
     /// Places a mesh, whatever motions the scene has for it; None gives it back to these.
-    fn place(
+    pub fn place(
         &self,
         py: Python<'_>,
         mesh: &str,
@@ -514,30 +284,13 @@ impl Scene {
         self.__copy__(py)
     }
 
-    /// What `pickle` keeps: the text of the scene, what was changed in it, and its arrays. Files that the text names are
-    /// read again where it is unpickled.
+    /// The scene as `pickle` keeps it.
     fn __reduce__<'py>(
         &self,
         py: Python<'py>,
     ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
         let state = self.lock(py).clone();
-        let meshes = PyList::empty(py);
-        for (name, given) in &state.given {
-            let vertices = arrays::triples(py, &given.positions)?;
-            let triangles = arrays::triples(py, &given.triangles)?;
-            let moved = state.moved.get(name).map(|now| arrays::triples(py, now)).transpose()?;
-            meshes.append((name, vertices, triangles, given.cap_openings, moved))?;
-        }
-        let placed = PyList::empty(py);
-        for (&instance, [placement, _]) in &state.placed {
-            let name = &state.scene.instances[instance].name;
-            placed.append((name, arrays::rows(py, placement)?))?;
-        }
-        let pose = state.pose.map(|pose| arrays::rows(py, &pose)).transpose()?;
-        let path = std::path::absolute(state.file.path())?;
-        let kept = (path, state.file.text(), &state.entries, meshes, placed, pose, state.time);
-        let again = py.import("insonify._insonify")?.getattr("again")?;
-        Ok((again, PyTuple::new(py, [kept.into_pyobject(py)?])?))
+        pickle::kept(py, &state)
     }
 
     fn __repr__(&self, py: Python<'_>) -> String {
@@ -551,45 +304,4 @@ impl Scene {
             scene.tissues.len()
         )
     }
-}
-
-/// A mesh in a pickle: name, vertices, triangles, whether openings are capped, and vertices where they were moved to.
-type Kept<'py> = (String, Bound<'py, PyAny>, Bound<'py, PyAny>, bool, Option<Bound<'py, PyAny>>);
-
-/// The scene that `pickle` has kept.
-#[pyfunction]
-#[allow(clippy::type_complexity, reason = "what `__reduce__` keeps, in its order")]
-pub fn again(
-    py: Python<'_>,
-    kept: (
-        PathBuf,
-        String,
-        Vec<(String, String)>,
-        Vec<Kept<'_>>,
-        Vec<(String, Bound<'_, PyAny>)>,
-        Option<Bound<'_, PyAny>>,
-        f64,
-    ),
-) -> PyResult<Scene> {
-    let (path, text, entries, meshes, placed, pose, time) = kept;
-    let mut given = BTreeMap::new();
-    let mut moved = Vec::new();
-    for (name, vertices, triangles, capped, now) in meshes {
-        let (vertices, triangles) = (arrays::positions(&vertices)?, arrays::triangles(&triangles)?);
-        given.insert(name.clone(), Arc::new(Given::new(&name, vertices, triangles, capped)?));
-        moved.extend(now.map(|now| (name, now)));
-    }
-    let file = SceneFile::of(&path, text);
-    let scene = Scene::made(py.detach(|| State::new(file, entries, given)))?;
-    for (name, vertices) in moved {
-        scene.set_vertices(py, &name, &vertices)?;
-    }
-    for (name, placement) in placed {
-        scene.place(py, &name, &placement)?;
-    }
-    if let Some(pose) = pose {
-        scene.set_pose(py, &pose)?;
-    }
-    scene.set_time(py, time)?;
-    Ok(scene)
 }

@@ -14,12 +14,15 @@ mod metadata;
 mod picture;
 mod receive;
 mod server;
+mod status;
+mod tools;
 mod tracking;
 pub mod wire;
 
 pub use command::{Order, Request};
 pub use picture::Picture;
-pub use server::{IgtlError, Server, ServerSettings, Status};
+pub use server::{IgtlError, Server, ServerSettings};
+pub use status::Status;
 pub use tracking::{TrackedPose, TrackerState};
 
 /// Device name of the images.

@@ -2,14 +2,11 @@
 
 use super::image::Image;
 pub use super::metadata::{ExtendedHeader, MetadataEntry};
+pub use super::tools::{PlacedTool, TrackedTool, matrix};
 use super::wire::{DecodeError, Label, Reader, Timestamp, checksum, put_floats};
 
 /// Bytes of a header.
 pub const HEADER: usize = 58;
-/// Bytes of a tool in a TDATA message.
-const TOOL_BYTES: usize = 70;
-/// Bytes of a tool in a QTDATA message.
-const PLACED_TOOL_BYTES: usize = 50;
 
 /// The header of every message.
 #[derive(Clone, Debug, PartialEq)]
@@ -75,44 +72,6 @@ pub struct Message {
     pub extension: Option<ExtendedHeader>,
     /// Content of the message.
     pub content: Content,
-}
-
-/// A tool of a TDATA message.
-#[derive(Clone, Debug, PartialEq)]
-pub struct TrackedTool {
-    /// Name.
-    pub name: Label<20>,
-    /// 1 tracker, 2 with all six degrees of freedom, 3 only its tip, 4 tip and axis.
-    pub kind: u8,
-    /// Not used by the protocol.
-    pub reserved: u8,
-    /// Matrix in the form of [`Content::Transform`].
-    pub matrix: [f32; 12],
-}
-
-/// A tool of a QTDATA message.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PlacedTool {
-    /// Name.
-    pub name: Label<20>,
-    /// As of a [`TrackedTool`].
-    pub kind: u8,
-    /// Not used by the protocol.
-    pub reserved: u8,
-    /// Its place, mm.
-    pub place: [f32; 3],
-    /// Its turn, a unit quaternion x, y, z, w.
-    pub turn: [f32; 4],
-}
-
-/// The matrix of a place and a turn, in the form of [`Content::Transform`].
-pub fn matrix(place: [f32; 3], turn: [f32; 4]) -> [f32; 12] {
-    let turn = glam::DQuat::from_array(turn.map(f64::from));
-    // Of no turn at all the rounded length says more than a quaternion of it.
-    let turn = if turn.length() > 0.0 { turn.normalize() } else { turn };
-    let place = glam::DVec3::from(place.map(f64::from));
-    let matrix = glam::DAffine3::from_rotation_translation(turn, place);
-    matrix.to_cols_array().map(|value| value as f32)
 }
 
 /// Content of a message.
@@ -205,25 +164,12 @@ impl Content {
     fn encode(&self, out: &mut Vec<u8>) {
         match self {
             Self::Transform(matrix) => put_floats(out, matrix),
-            Self::Tracking(tools) => {
-                for tool in tools {
-                    out.extend(tool.name.0);
-                    out.extend([tool.kind, tool.reserved]);
-                    put_floats(out, &tool.matrix);
-                }
-            }
+            Self::Tracking(tools) => tools.iter().for_each(|tool| tool.encode(out)),
             Self::Position { place, turn } => {
                 put_floats(out, place);
                 put_floats(out, turn);
             }
-            Self::Placed(tools) => {
-                for tool in tools {
-                    out.extend(tool.name.0);
-                    out.extend([tool.kind, tool.reserved]);
-                    put_floats(out, &tool.place);
-                    put_floats(out, &tool.turn);
-                }
-            }
+            Self::Placed(tools) => tools.iter().for_each(|tool| tool.encode(out)),
             Self::Image(image) => image.encode(out),
             Self::Status { code, subcode, name, message } => {
                 out.extend(code.to_be_bytes());
@@ -263,18 +209,10 @@ impl Content {
                 Self::Transform(matrix)
             }
             "TDATA" => {
-                if !content.len().is_multiple_of(TOOL_BYTES) {
+                if !content.len().is_multiple_of(TrackedTool::BYTES) {
                     return Err(odd("a TDATA"));
                 }
-                let tools = content.chunks_exact(TOOL_BYTES).map(|tool| {
-                    let mut from = Reader::new(tool, "a TDATA");
-                    Ok(TrackedTool {
-                        name: Label(from.array()?),
-                        kind: from.u8()?,
-                        reserved: from.u8()?,
-                        matrix: from.floats()?,
-                    })
-                });
+                let tools = content.chunks_exact(TrackedTool::BYTES).map(TrackedTool::decode);
                 Self::Tracking(tools.collect::<Result<_, _>>()?)
             }
             "POSITION" => {
@@ -289,19 +227,10 @@ impl Content {
                 Self::Position { place, turn }
             }
             "QTDATA" => {
-                if !content.len().is_multiple_of(PLACED_TOOL_BYTES) {
+                if !content.len().is_multiple_of(PlacedTool::BYTES) {
                     return Err(odd("a QTDATA"));
                 }
-                let tools = content.chunks_exact(PLACED_TOOL_BYTES).map(|tool| {
-                    let mut from = Reader::new(tool, "a QTDATA");
-                    Ok(PlacedTool {
-                        name: Label(from.array()?),
-                        kind: from.u8()?,
-                        reserved: from.u8()?,
-                        place: from.floats()?,
-                        turn: from.floats()?,
-                    })
-                });
+                let tools = content.chunks_exact(PlacedTool::BYTES).map(PlacedTool::decode);
                 Self::Placed(tools.collect::<Result<_, _>>()?)
             }
             "IMAGE" => Self::Image(Box::new(Image::decode(content)?)),

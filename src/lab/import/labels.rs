@@ -179,7 +179,7 @@ impl<'p> Merging<'p> {
         }
         let over = self.winners(&layer);
         for (below, above) in self.voxels.iter_mut().zip(layer).filter(|(_, above)| *above > 0) {
-            let (winner, loser) = match over.contains(&(above, *below)) || *below == 0 {
+            let (winner, loser) = match *below == 0 || over.contains(&(above, *below)) {
                 true => (above, *below),
                 false => (*below, above),
             };
