@@ -12,7 +12,7 @@ use crate::arrays;
 use crate::scene::Scene;
 use crate::state::{Given, State};
 
-/// What `pickle` keeps of a scene: the function that makes it again, and its argument.
+/// The function that makes a scene again, and its argument: what `pickle` keeps.
 pub fn kept<'py>(
     py: Python<'py>,
     state: &State,

@@ -19,7 +19,7 @@ pub struct Given {
     pub positions: Vec<[f32; 3]>,
     pub triangles: Vec<[u32; 3]>,
     pub cap_openings: bool,
-    /// What is to be said of it.
+    /// Warnings about it.
     pub warnings: Vec<String>,
 }
 

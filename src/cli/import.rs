@@ -173,9 +173,7 @@ fn device_set(source: &Path, folder: &Path, args: &Import) -> Result<()> {
     let scene = import::device_set::import(source, folder, &poses, args.force)?;
     notes(&scene.issues);
     let path = scene.finish()?;
-    for structure in &scene.draft.left_out {
-        output::line(format!("left out: {structure}, which no scene takes"));
-    }
+    remarks(&scene.draft);
     for part in &scene.draft.parts {
         output::line(format!("{}: {} triangles, {:.1} ml", part.name, part.triangles, part.volume));
     }
@@ -209,6 +207,16 @@ fn trajectory(source: &Path, file: &Path, args: &Import) -> Result<()> {
     Ok(())
 }
 
+/// Says which structures are no mesh of the scene, and what else is remarkable.
+fn remarks(draft: &Draft) {
+    for structure in &draft.left_out {
+        output::line(format!("left out: {structure}, which no scene takes"));
+    }
+    for remark in &draft.remarks {
+        output::line(format!("note: {remark}"));
+    }
+}
+
 /// Says what became of each structure, what had no tissue, and where the probe is.
 fn report(draft: &Draft) {
     for part in &draft.parts {
@@ -222,12 +230,7 @@ fn report(draft: &Draft) {
             part.name, part.tissue, part.triangles, part.volume
         ));
     }
-    for structure in &draft.left_out {
-        output::line(format!("left out: {structure}, which no scene takes"));
-    }
-    for remark in &draft.remarks {
-        output::line(format!("note: {remark}"));
-    }
+    remarks(draft);
     let all: usize = draft.parts.iter().map(|p| p.triangles).sum();
     output::line(format!("{} meshes, {all} triangles", draft.parts.len()));
     let unknown: Vec<_> =

@@ -151,7 +151,7 @@ fn state(scene: &Scene) -> (DAffine3, Vec<Placed>) {
 #[derive(Default)]
 struct Told {
     tracker: String,
-    /// Why nothing moves the probe.
+    /// Reason for which nothing moves the probe; empty without one.
     silence: String,
     status: Status,
     at: Option<Instant>,

@@ -49,7 +49,7 @@ pub(super) struct Report {
     pub(super) address: SocketAddr,
     /// Numbers of clients and messages so far.
     pub(super) status: Status,
-    /// Why the probe stays although messages come in.
+    /// Reason for which the probe stays although messages come in.
     pub(super) silence: Option<String>,
     /// State of the tracker.
     pub(super) tracked: TrackerState,

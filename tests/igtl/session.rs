@@ -177,6 +177,12 @@ fn matrices_of_a_hidden_tool_are_a_gap() {
         until("it is lost", || matches!(server.pose(), TrackerState::Lost(_)));
         assert_eq!(place(&server).x, f64::from(round), "it stays");
     }
+    client.transform("ProbeToReference", shift(8.0, 0.0, 0.0));
+    until("it is seen", || matches!(server.pose(), TrackerState::Live(_)));
+    let content = Content::Position { place: [0.0; 3], turn: vec![0.0; 4] };
+    client.send(&Message::new("ProbeToReference", content));
+    until("it is lost", || matches!(server.pose(), TrackerState::Lost(_)));
+    assert_eq!(place(&server).x, 8.0, "it stays");
     let tools = [[f32::NAN; 12], shift(9.0, 0.0, 0.0)];
     let tools = ["Stylus", "ProbeToReference"].into_iter().zip(tools);
     let tool =

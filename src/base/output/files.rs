@@ -11,7 +11,7 @@ const DRAFTS: u32 = 100;
 /// finished: no failure leaves half a file. Dropped before, it is removed. Pipes and devices are written to as they are.
 pub struct Draft {
     path: PathBuf,
-    /// Where it is written; `path` itself for a stream.
+    /// Path of what is being written; `path` itself for a stream.
     beside: PathBuf,
     /// None once the file has taken its place.
     file: Option<File>,

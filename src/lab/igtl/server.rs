@@ -116,7 +116,7 @@ impl Shared {
         }
     }
 
-    /// Why the probe stays although messages come in.
+    /// The reason for which the probe stays although messages come in.
     pub fn silent(&self) -> Option<String> {
         let tracker = self.tracking.tracker();
         self.status.lock().silence(tracker.device.as_deref())
@@ -253,7 +253,7 @@ impl Server {
         self.shared.outdated.store(true, Ordering::Relaxed);
     }
 
-    /// Why the probe stays although messages come in: none of them is the tool that it is to follow.
+    /// The reason for which the probe stays although messages come in: none of them is the tool that it is to follow.
     pub fn silent(&self) -> Option<String> {
         self.shared.silent()
     }

@@ -1,4 +1,4 @@
-//! What has happened at a server so far.
+//! Counts of a server's events so far, and the reason for which the probe stays.
 
 /// Counts of events so far.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -40,7 +40,7 @@ impl Status {
         }
     }
 
-    /// What comes in and moves nothing, where nothing moves the probe: a tool of another name, or of a type that is not
+    /// The reason for which nothing moves the probe although messages come in: tools of other names, types that are not
     /// read. `wanted` is the name that is waited for, where there is one.
     pub fn silence(&self, wanted: Option<&str>) -> Option<String> {
         if self.poses > 0 || self.others.is_empty() {

@@ -30,11 +30,9 @@ pub struct PlacedTool {
     pub turn: [f32; 4],
 }
 
-/// The matrix of a place and a turn, in the form of [`Content::Transform`](super::message::Content::Transform).
+/// The matrix of a place and a turn, of numbers that are none for a turn of zeros, in the form of [`Content::Transform`](super::message::Content::Transform).
 pub fn matrix(place: [f32; 3], turn: [f32; 4]) -> [f32; 12] {
-    let turn = glam::DQuat::from_array(turn.map(f64::from));
-    // Of no turn at all the rounded length says more than a quaternion of it.
-    let turn = if turn.length() > 0.0 { turn.normalize() } else { turn };
+    let turn = glam::DQuat::from_array(turn.map(f64::from)).normalize();
     let place = glam::DVec3::from(place.map(f64::from));
     let matrix = glam::DAffine3::from_rotation_translation(turn, place);
     matrix.to_cols_array().map(|value| value as f32)

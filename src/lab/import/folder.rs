@@ -45,7 +45,7 @@ pub(super) enum Contents {
     Masks(Vec<PathBuf>),
 }
 
-/// What a folder holds.
+/// The meshes of a folder or, without any, its masks.
 ///
 /// # Errors
 /// It cannot be read, or there is nothing in it.

@@ -143,7 +143,7 @@ impl LabelMap {
 pub struct Merged {
     /// The labels of the voxels.
     pub grid: Grid,
-    /// What each has lost.
+    /// Losses of the labels to others.
     pub covered: Vec<Covered>,
     /// Remarks on the labels and their files.
     pub remarks: Vec<String>,

@@ -7,7 +7,7 @@ use crate::volume::fields::{Field, Fields};
 use crate::volume::grid::{Frame, Grid};
 use crate::volume::layout::Axis;
 
-/// What a header says of the axes in space.
+/// The axes of a header in space.
 pub(super) struct Space {
     /// Direction of each axis times its spacing, none for those outside space; none where no directions are given.
     pub directions: Option<Vec<Option<DVec3>>>,
