@@ -32,18 +32,24 @@ fn statistics_hold_for_sixteen_seeds() {
             }
         }
     }
+    let mut wrong = Vec::new();
     for (what, figures) in found {
         assert_eq!(figures.len(), SEEDS as usize, "{what}");
         let beyond = figures.iter().filter(|f| !f.holds()).count();
         let distance = what.contains("Kolmogorov");
-        assert!(beyond <= usize::from(distance), "{what}: {figures:#?}");
         let errors: Vec<f64> = figures.iter().map(|f| f.measured - f.expected).collect();
-        let bias = mean(&errors).abs();
-        assert!(distance || bias <= 0.5 * figures[0].tolerance, "{what}: on average off by {bias}");
-        println!(
-            "{what}: off by {bias:.4} on average, {:.4} at most; {:.4} allowed",
+        let bias = mean(&errors);
+        let text = format!(
+            "{what}: off by {bias:.4} on average, {:.4} at most; {:.4} allowed of {:.4}",
             errors.iter().map(|e| e.abs()).fold(0.0, f64::max),
-            figures[0].tolerance
+            figures[0].tolerance,
+            figures[0].expected
         );
+        println!("{text}");
+        let biased = !distance && bias.abs() > 0.5 * figures[0].tolerance;
+        if biased || beyond > usize::from(distance) {
+            wrong.push(text);
+        }
     }
+    assert!(wrong.is_empty(), "{wrong:#?}");
 }
