@@ -59,10 +59,15 @@ pub fn run(args: &Dataset) -> Result<()> {
     let (plan, warnings) = Plan::load(&args.plan)?;
     common::notes(&warnings);
     let run = Run { plan: &plan, root: &args.output, shard: args.shard, resume: args.resume };
-    run.check()?;
+    let checked = run.check()?;
     let (parts, samples) = (run.parts(), run.samples());
     if args.check {
         said(&plan, &parts, samples);
+        if checked < samples {
+            output::line(format!(
+                "the draws of {checked} of them were checked, evenly among them; the rest when they are made"
+            ));
+        }
         return Ok(());
     }
     if parts.is_empty() {

@@ -1,53 +1,67 @@
 //! Names of the images of several frames.
 
+use std::ffi::OsString;
 use std::fmt;
 use std::path::{MAIN_SEPARATOR, Path, PathBuf};
 
 /// File names of a number of frames.
 #[derive(Debug)]
 pub struct Images {
-    /// The part before the number, or the whole name where there is none.
-    before: String,
-    /// Least digits of the number, and the part after it.
-    numbered: Option<(usize, String)>,
+    output: PathBuf,
+    number: Number,
     frames: u32,
+}
+
+/// The place of a frame's number in its file's name.
+#[derive(Debug)]
+enum Number {
+    /// There is none.
+    Nowhere,
+    /// Between name and extension, with so many digits.
+    BeforeExtension(usize),
+    /// Between these two parts, with at least so many digits.
+    Between(String, usize, String),
 }
 
 impl Images {
     /// The number takes the place of the first `{}` or `%04d` in the file name of `output`; several frames
-    /// without either are numbered before the extension.
+    /// without either are numbered before the extension, as those of a path that is no text.
     pub fn new(output: &Path, frames: u32) -> Self {
-        let text = output.to_string_lossy();
         // All numbers are as long as the last, so that names sort.
         let digits = frames.saturating_sub(1).to_string().len().max(4);
-        let parts = braces(&text, digits)
-            .or_else(|| percent(&text))
-            .or_else(|| (frames > 1).then(|| before_extension(output, digits)));
-        match parts {
-            Some((before, digits, after)) => {
-                Self { before, numbered: Some((digits, after)), frames }
-            }
-            None => Self { before: text.into_owned(), numbered: None, frames },
-        }
+        let asked = output.to_str().and_then(|text| braces(text, digits).or_else(|| percent(text)));
+        let number = match asked {
+            Some((before, digits, after)) => Number::Between(before, digits, after),
+            None if frames > 1 => Number::BeforeExtension(digits),
+            None => Number::Nowhere,
+        };
+        Self { output: output.to_owned(), number, frames }
     }
 
     /// File of frame `index`.
     pub fn path(&self, index: u32) -> PathBuf {
-        let before = &self.before;
-        PathBuf::from(match &self.numbered {
-            Some((digits, after)) => format!("{before}{index:0digits$}{after}"),
-            None => before.clone(),
-        })
+        match &self.number {
+            Number::Nowhere => self.output.clone(),
+            Number::BeforeExtension(digits) => {
+                let mut ending = OsString::from(format!("{index:0digits$}"));
+                if let Some(extension) = self.output.extension() {
+                    ending.push(".");
+                    ending.push(extension);
+                }
+                self.output.with_extension(ending)
+            }
+            Number::Between(before, digits, after) => {
+                PathBuf::from(format!("{before}{index:0digits$}{after}"))
+            }
+        }
     }
-}
 
-impl Images {
     /// The file with what is said of all of them: their name without its number, as JSON.
     pub fn sidecar(&self) -> PathBuf {
-        let Some((_, after)) = &self.numbered else {
-            return Path::new(&self.before).with_extension("json");
+        let Number::Between(before, _, after) = &self.number else {
+            return self.output.with_extension("json");
         };
-        let before = self.before.trim_end_matches(['.', '-', '_']);
+        let before = before.trim_end_matches(['.', '-', '_']);
         match before.is_empty() || before.ends_with(MAIN_SEPARATOR) {
             true => PathBuf::from(format!("{before}frames.json")),
             false if after.starts_with('.') => PathBuf::from(format!("{before}.json")),
@@ -87,13 +101,6 @@ fn percent(text: &str) -> Option<Parts> {
     })
 }
 
-fn before_extension(output: &Path, digits: usize) -> Parts {
-    let extension =
-        output.extension().map_or_else(String::new, |e| format!(".{}", e.to_string_lossy()));
-    let stem = output.with_extension("");
-    (format!("{}.", stem.to_string_lossy()), digits, extension)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -127,5 +134,19 @@ mod tests {
         }
         let images = Images::new(Path::new("a.png"), 2);
         assert_eq!(images.to_string(), "a.0000.png to a.0001.png");
+    }
+
+    // Folders as other programs and languages have named them.
+    #[cfg(unix)]
+    #[test]
+    fn paths_that_are_no_text_stay_as_they_are() {
+        use std::os::unix::ffi::OsStrExt;
+
+        let path = |bytes: &[u8]| PathBuf::from(std::ffi::OsStr::from_bytes(bytes));
+        let output = path(b"ou\xff\xfet/a.png");
+        assert_eq!(Images::new(&output, 1).path(0), output);
+        assert_eq!(Images::new(&output, 2).path(1), path(b"ou\xff\xfet/a.0001.png"));
+        assert_eq!(Images::new(&output, 2).sidecar(), path(b"ou\xff\xfet/a.json"));
+        assert_eq!(Images::new(&path(b"\xff"), 2).path(0), path(b"\xff.0000"));
     }
 }

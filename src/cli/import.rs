@@ -14,7 +14,7 @@ use insonify::settings::suggest;
 use insonify::volume::{Frame, Pose, frames_of_pose, transform};
 use miette::{Result, miette};
 
-use super::common::{Progress, notes};
+use super::common::{Progress, distinct, notes};
 use super::reconstruct::spacing;
 
 /// Arguments of `insonify import`.
@@ -102,6 +102,13 @@ pub fn run(args: &Import) -> Result<()> {
     let ends =
         |path: &Path, with: &str| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(with));
     if ends(folder, "csv") {
+        let given = [
+            ("the sequence", Some(source)),
+            ("--config", args.config.as_ref()),
+            ("--labels", args.labels.as_ref()),
+        ];
+        let given = given.map(|(name, path)| (name, path.map(PathBuf::as_path)));
+        distinct(&given, &[("-o", Some(folder))])?;
         return trajectory(source, folder, args);
     }
     if ends(source, "xml") {

@@ -1,10 +1,12 @@
 //! `insonify vary`: many images of one scene on one contact sheet.
 
 use std::fmt;
+use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use insonify::output;
+use insonify::output::files;
 use insonify::output::sheet::{Sheet, Tile};
 use insonify::random::order;
 use insonify::scene::Scene;
@@ -118,16 +120,19 @@ impl Files {
         let named = || PathBuf::from(format!("{stem}-{}.png", args.show));
         let output = args.output.clone().unwrap_or_else(named);
         let png = |e: &std::ffi::OsStr| e.eq_ignore_ascii_case("png");
-        if output.extension().is_some_and(png) {
+        let files = if output.extension().is_some_and(png) {
             common::writable(&output)?;
-            return Ok(Self { table: output.with_extension("csv"), sheet: output, folder: None });
-        }
-        common::writable_folder(&output)?;
-        Ok(Self {
-            sheet: output.join("sheet.png"),
-            table: output.join("sheet.csv"),
-            folder: Some(output),
-        })
+            Self { table: output.with_extension("csv"), sheet: output, folder: None }
+        } else {
+            common::writable_folder(&output)?;
+            let [sheet, table] = ["sheet.png", "sheet.csv"].map(|name| output.join(name));
+            Self { sheet, table, folder: Some(output) }
+        };
+        common::distinct(
+            &[("the scene", Some(&args.scene))],
+            &[("-o", Some(&files.sheet)), ("the table beside it", Some(&files.table))],
+        )?;
+        Ok(files)
     }
 }
 
@@ -183,7 +188,10 @@ fn write(args: &Vary, scene: &Scene, pictures: &[Picture], files: &Files) -> Res
 }
 
 fn save(image: &image::GrayImage, path: &Path) -> Result<()> {
-    image.save(path).into_diagnostic().wrap_err_with(|| format!("writing {}", path.display()))
+    let mut png = Cursor::new(Vec::new());
+    image.write_to(&mut png, image::ImageFormat::Png).into_diagnostic()?;
+    let written = files::replace(path, png.get_ref());
+    written.into_diagnostic().wrap_err_with(|| format!("writing {}", path.display()))
 }
 
 /// Name of a single image. In blind rating it does not reveal the content.

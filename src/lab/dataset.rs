@@ -31,7 +31,7 @@ mod tables;
 
 pub use members::colours;
 pub use plan::{Array, Format, Part, Plan, Sample, Segmented, Split};
-pub use run::Run;
+pub use run::{MOST_CHECKED, Run};
 pub use sheet::Gallery;
 pub use store::{Store, Told};
 pub use studio::{Made, Studio};

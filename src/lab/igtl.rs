@@ -12,6 +12,7 @@ pub mod image;
 pub mod message;
 mod metadata;
 mod picture;
+mod reach;
 mod receive;
 mod server;
 mod status;
@@ -21,6 +22,7 @@ pub mod wire;
 
 pub use command::{Order, Request};
 pub use picture::Picture;
+pub use reach::Reach;
 pub use server::{IgtlError, Server, ServerSettings};
 pub use status::Status;
 pub use tracking::{TrackedPose, TrackerState};

@@ -1,13 +1,12 @@
 //! Commands of OpenIGTLink clients, carried out in the window.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 use super::files::said;
 use super::model::Model;
-use crate::igtl::Order;
+use crate::igtl::{Order, Reach};
 use crate::scene::file::{facts, put_settings, value_of_settings};
-use crate::scene::shipped;
 
 /// Carries out the order of a client; returns the answer. A scene to be opened becomes `wanted`.
 ///
@@ -45,10 +44,7 @@ pub(super) fn carry_out(
             Ok(if *frozen { "frozen" } else { "running" }.to_owned())
         }
         Order::Scene(name) => {
-            let path = shipped::find(Path::new(name)).map_err(|error| error.to_string())?;
-            if !path.is_file() {
-                return Err(format!("{name} is not there; scenes that ship: {}", shipped::names()));
-            }
+            let path = Reach::of(&model.file.path).scene(name)?;
             let told = format!("opening {}", path.display());
             *wanted = Some(path);
             Ok(told)
@@ -58,8 +54,9 @@ pub(super) fn carry_out(
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
     use super::*;
-    use crate::igtl::Order;
     use crate::model::File;
     use crate::scene::Scene;
     use crate::sim::Tracer;

@@ -12,12 +12,13 @@ use insonify::sim::layout;
 /// Longest wait: on an idle machine everything here is much faster.
 pub const PATIENCE: Duration = Duration::from_secs(120);
 
-/// Short limits, so that a test can wait for them; but a pose never grows old, however busy the
-/// machine is.
+/// Short limits, so that a test can wait for them; but a pose never grows old, and no client too silent, however busy
+/// the machine is.
 pub fn settings() -> ServerSettings {
     let tracker = Tracker { timeout: 3600.0, ..Tracker::default() };
     ServerSettings {
         clients: 4,
+        silence: Duration::from_secs(3600),
         message_timeout: Duration::from_millis(400),
         send_timeout: Duration::from_millis(800),
         ..ServerSettings::new(tracker)

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use insonify::dataset::Plan;
+use insonify::dataset::{MOST_CHECKED, Plan, Run};
 
 use crate::dataset::{Desk, PLAN, SCENE};
 
@@ -12,6 +12,14 @@ const MISTAKES: &[(&str, &str, &[&str])] = &[
     ("\"webdataset\"", "\"webdatset\"", &["unknown variant `webdatset`", "`webdataset`"]),
     ("formats = [\"folder\", \"webdataset\"]", "formats = []", &["there is no format"]),
     ("samples_per_part = 2", "samples_per_part = 0", &["a part of no samples"]),
+    ("\"webdataset\"]", "\"webdataset\", \"folder\"]", &["stands here twice", "leave out one"]),
+    ("\"iq\"]", "\"iq\", \"envelope\"]", &["`envelope` stands here twice", "leave out one"]),
+    // The alphabetically first draw is another one.
+    (
+        "simulation.density_scale =",
+        "mesh.nobody.priority = 3\nsimulation.density_scale =",
+        &["mesh.nobody.priority cannot be 3", "there is no mesh `nobody`", "`plate`"],
+    ),
     ("seed = 3", "seed = 3\nquality = \"best\"", &["unknown quality `best`", "`draft`"]),
     ("imaging.gain", "imaging.gian", &["no key `imaging.gian`", "did you mean `gain`?"]),
     ("imaging.gain", "imagin.gain", &["no table `imagin`", "did you mean `imaging`?"]),
@@ -148,6 +156,49 @@ fn mistakes_are_told_with_their_place_before_anything_is_made() {
     }
     let (went_well, said) = desk.make(&["-o", "made"]);
     assert!(!went_well && !desk.path("made").exists(), "{said}");
+}
+
+#[test]
+fn a_missing_key_is_looked_up_in_the_manual_of_data_sets() {
+    let desk = Desk::new();
+    desk.write("plan.toml", &PLAN.replace("formats = ", "# formats = "));
+    let Err(error) = Plan::load(&desk.path("plan.toml")) else { panic!("it has no formats") };
+    let remedy = error.remedy.unwrap_or_default();
+    assert_eq!(remedy, "give `formats`; docs/datasets.md says what it takes");
+}
+
+// Ten million samples took minutes without a word, a billion all memory.
+#[test]
+fn plans_of_many_samples_are_checked_soon_and_of_more_parts_than_a_folder_holds_refused() {
+    let desk = Desk::new();
+    let plan = |samples: &str, part: &str| {
+        let plan = PLAN.replace("samples = 12", &format!("samples = {samples}"));
+        desk.write("plan.toml", &plan.replace("samples_per_part = 2", part));
+        Plan::load(&desk.path("plan.toml"))
+    };
+    for (samples, part) in [
+        ("10_000_000", "samples_per_part = 1000"),
+        ("500_000_000", "samples_per_part = 1_000_000"),
+        ("20_000", ""),
+    ] {
+        let (plan, _) = plan(samples, part).expect("a plan");
+        let run = Run { plan: &plan, root: &desk.path("made"), shard: [0, 1], resume: false };
+        let checked = run.check().expect("all fit");
+        assert!((10_000..=MOST_CHECKED).contains(&checked), "{samples}: {checked}");
+        // A shard of it that is small enough is checked whole.
+        let shard = Run { shard: [0, 100_000], ..run };
+        if shard.samples() <= MOST_CHECKED {
+            assert_eq!(shard.check().expect("all fit"), shard.samples());
+        }
+    }
+    for (samples, part, remedy) in [
+        ("900_000_000", "samples_per_part = 2", "set samples_per_part to 901 or more"),
+        ("900_000_000", "", "set samples_per_part to 901 or more"),
+        ("4_000_000_000", "", "make several plans"),
+    ] {
+        let Err(error) = plan(samples, part) else { panic!("{samples} are taken") };
+        assert!(error.remedy.as_deref().is_some_and(|r| r.contains(remedy)), "{error}");
+    }
 }
 
 #[test]

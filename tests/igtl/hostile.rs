@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use glam::DAffine3;
 use insonify::igtl::message::{Content, HEADER, Message};
 use insonify::igtl::wire::checksum;
-use insonify::igtl::{Server, TrackerState};
+use insonify::igtl::{Server, ServerSettings, TrackerState};
 
 use crate::common::client::{Client, grey, query, serve, settings, shift, until};
 
@@ -169,6 +169,34 @@ fn a_hundred_connections_are_told_that_there_is_no_room() {
     drop(served);
     until("they have gone", || server.status().clients == 0);
     assert_serves(&server);
+}
+
+#[test]
+fn whoever_is_silent_longest_gives_way_to_a_client_for_which_there_is_no_room() {
+    let server = serve(ServerSettings { silence: Duration::ZERO, ..settings() });
+    let mut all: Vec<_> = (0..4)
+        .map(|n| {
+            let client = Client::connect(&server);
+            until("it is in", || server.status().clients == n + 1);
+            client
+        })
+        .collect();
+    // The first one speaks: now the second has been silent longest.
+    all[0].transform("Probe", shift(1.0, 0.0, 0.0));
+    until("it is heard", || server.status().poses == 1);
+    let mut fifth = Client::connect(&server);
+    until("it is in", || server.status().accepted == 5);
+    let Some(Content::Status { message, .. }) = all[1].receive().map(|message| message.content)
+    else {
+        panic!("no status")
+    };
+    let told = String::from_utf8_lossy(&message).into_owned();
+    assert!(told.contains("nothing came from it") && all[1].is_ended(), "{told}");
+    until("it has gone", || server.status().clients == 4);
+    fifth.transform("Probe", shift(2.0, 0.0, 0.0));
+    all[0].transform("Probe", shift(3.0, 0.0, 0.0));
+    until("both are heard", || server.status().poses == 3);
+    assert_eq!(server.status().refused, 0);
 }
 
 #[test]

@@ -160,6 +160,9 @@ fn commands_set_any_key_time_and_scene_and_are_answered() {
         ("scene", "nowhere", "scenes that ship: abdomen"),
         ("louder", "", "is no command"),
         ("time", "4 mm", "error: "),
+        ("scene", "/etc/passwd", "clients open none elsewhere"),
+        ("scene", "/nowhere/at/all", "clients open none elsewhere"),
+        ("mesh.0.file", "/etc/passwd", "names a file"),
     ] {
         let said = order(&mut client, 4, name, text);
         assert!(said.starts_with("error: ") && said.contains(cause), "{name} {text}: {said}");
@@ -172,6 +175,16 @@ fn commands_set_any_key_time_and_scene_and_are_answered() {
     let Content::String { text, .. } = answer.content else { panic!("no text") };
     let said = String::from_utf8(text).expect("UTF-8");
     assert!(answer.device.is("me") && said.contains("mesh"), "{said}");
+    // What is nested deeper than the stack allows.
+    for parts in [17, 12_000, 30_000] {
+        let text = format!("{} = 1", vec!["a"; parts].join(".")).into_bytes();
+        client.send(&Message::new("me", Content::String { encoding: 3, text }));
+        let Content::String { text, .. } = client.receive_kind("STRING").content else {
+            panic!("no text")
+        };
+        let said = String::from_utf8(text).expect("UTF-8");
+        assert!(said.starts_with("error: ") && said.contains(&format!("{parts} parts")), "{said}");
+    }
     assert_eq!(order(&mut client, 6, "freeze", ""), "frozen");
     assert_eq!(order(&mut client, 7, "time", "400 ms"), "time = 0.4 s");
     assert_eq!(order(&mut client, 8, "unfreeze", ""), "running");

@@ -238,7 +238,7 @@ impl Film {
         self.said.insert("frames".into(), self.frames.into());
         let beside = |path: &PathBuf| elsewhere != Some(path) && !files::is_stream(output);
         if let Some(path) = sidecar.filter(beside) {
-            common::write_json(&path, &self.said)?;
+            common::write_sidecar(&path, &self.said)?;
         }
         Ok(self.said)
     }

@@ -5,9 +5,9 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use insonify::gpu::Device;
-use insonify::igtl::{Order, Server};
+use insonify::igtl::{Order, Reach, Server};
+use insonify::scene::Scene;
 use insonify::scene::file::{self, SceneError, SceneFile};
-use insonify::scene::{Scene, shipped};
 use insonify::sim::Simulator;
 use insonify::sim::calibration::Work;
 use insonify::sim::shaders::Library;
@@ -28,9 +28,12 @@ pub struct Session<'a> {
     pub simulator: Simulator,
     /// The scene in its present state.
     pub scene: Scene,
+    /// What clients may open.
+    reach: Reach,
     path: PathBuf,
     file: SceneFile,
-    /// Overrides of the command line, which belong to its own scene file.
+    /// The scene file of the command line, with the overrides there, which belong to it.
+    first: PathBuf,
     given: Entries,
     entries: Entries,
     /// A moment, and the scene's time then, s.
@@ -49,13 +52,16 @@ impl<'a> Session<'a> {
         let mut scene = common.scene(&args.scene)?;
         let file = SceneFile::read(&args.scene)?;
         let Stage { device, simulator, .. } = common.stage(&mut scene, &Library::embedded())?;
+        let path = args.scene.canonicalize().unwrap_or_else(|_| args.scene.clone());
         Ok(Self {
             args,
             device,
             simulator,
             scene,
-            path: args.scene.clone(),
+            reach: Reach::of(&path),
+            path: path.clone(),
             file,
+            first: path,
             given: common.overrides(&args.scene)?,
             entries: Vec::new(),
             clock: (Instant::now(), common.time),
@@ -93,7 +99,7 @@ impl<'a> Session<'a> {
                 Ok(if *frozen { "frozen" } else { "running" }.to_owned())
             }
             Order::Scene(name) => {
-                let path = shipped::find(Path::new(name)).map_err(|e| e.to_string())?;
+                let path = self.reach.scene(name)?;
                 let file = SceneFile::read(&path).map_err(said)?;
                 self.open(&path, Vec::new(), server)?;
                 (self.path, self.file) = (path, file);
@@ -105,6 +111,7 @@ impl<'a> Session<'a> {
     }
 
     fn set(&mut self, pairs: &[(String, String)], server: &Server) -> Result<String, String> {
+        Reach::settings(pairs)?;
         let mut entries = self.entries.clone();
         for (path, value) in pairs {
             entries.retain(|(known, _)| known != path);
@@ -148,7 +155,7 @@ impl<'a> Session<'a> {
 
     /// Overrides of a scene file: those of the command line, which belong to its own file, and those of clients.
     fn all(&self, path: &Path, entries: &Entries) -> Entries {
-        match path == self.args.scene {
+        match path == self.first {
             true => [self.given.clone(), entries.clone()].concat(),
             false => entries.clone(),
         }

@@ -24,7 +24,7 @@ const MAX_PLAN: u64 = 4 << 20;
 /// Most classes of a segmentation: a byte, of which one value shows nothing.
 const MAX_CLASSES: usize = NOTHING as usize;
 /// Samples of a part, unless the plan says it.
-const PART: u32 = 100;
+pub(super) const PART: u32 = 100;
 /// The scene's time.
 pub(super) const TIME: Facts = Facts::quantity(&DURATION, -1e6, 1e6).key("time");
 
@@ -184,7 +184,7 @@ impl Plan {
     /// The first mistake, with file, line, column and remedy.
     pub fn load(path: &Path) -> Result<(Self, Vec<Warning>), SceneError> {
         let text = issue::read_text(path, MAX_PLAN, "make several plans of it")?;
-        let source = Source::of(path, text);
+        let source = Source::of(path, text).described_in("docs/datasets.md");
         let document = source.document()?;
         let table: PlanTable = document.parse_as()?;
         let quality = quality(&document, table.quality.as_deref())?;

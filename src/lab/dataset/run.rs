@@ -10,6 +10,9 @@ use super::{DatasetError, Gallery, Part, Plan, Store, Studio, Told};
 use crate::gpu::Device;
 use crate::sim::Tracer;
 
+/// Most samples of a shard whose draws are checked before it is made: some seconds of work.
+pub const MOST_CHECKED: u32 = 20_000;
+
 /// A shard that is to be made.
 pub struct Run<'p> {
     /// The plan.
@@ -34,12 +37,17 @@ impl Run<'_> {
         self.parts().iter().map(|part| part.samples.len() as u32).sum()
     }
 
-    /// Checks what the shard's samples draw, without making one.
+    /// Checks what the shard's samples draw, without making one: of more than [`MOST_CHECKED`] so many, evenly among them.
+    /// Returns their number. The ends of all ranges are checked with the plan, and each sample once more when it is made.
     ///
     /// # Errors
     /// The first draw that does not fit, with its place in the plan.
-    pub fn check(&self) -> Result<(), DatasetError> {
-        Ok(self.plan.check(self.parts().iter().flat_map(|part| part.samples.clone()))?)
+    pub fn check(&self) -> Result<u32, DatasetError> {
+        let (parts, all) = (self.parts(), self.samples());
+        let step = all.div_ceil(MOST_CHECKED).max(1) as usize;
+        let numbers = parts.iter().flat_map(|part| part.samples.clone()).step_by(step);
+        self.plan.check(numbers)?;
+        Ok(all.div_ceil(step as u32))
     }
 
     /// Makes the shard and its contact sheet; `told` hears of each sample and part, and may end the run by an error.

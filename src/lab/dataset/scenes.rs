@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::Path;
+use std::slice;
 
 use super::draws::{Draw, Kind};
 use super::links::linked;
@@ -143,11 +144,18 @@ impl Reading<'_> {
                     false => made.file.load(&all).map(|(loaded, _)| *scene = loaded),
                 };
                 with.map_err(|error| {
+                    // One that fits nowhere is at fault wherever the others lie.
+                    let alone = |d: &&Draw| {
+                        all.iter()
+                            .any(|e| e.0 == d.name && made.file.check(slice::from_ref(e)).is_err())
+                    };
+                    let own = entries().find(alone).unwrap_or(draw);
+                    let text = all.iter().rfind(|e| e.0 == own.name).map_or("", |e| &e.1);
                     let message = format!(
-                        "{} cannot be {} in `{}`: {}",
-                        draw.name, end.text, made.name, error.message
+                        "{} cannot be {text} in `{}`: {}",
+                        own.name, made.name, error.message
                     );
-                    self.document.fail(&draw.at, message, error.remedy.unwrap_or_default())
+                    self.document.fail(&own.at, message, error.remedy.unwrap_or_default())
                 })?;
                 if let Some(Work { too_much: true, message, remedy }) = Work::of(scene) {
                     let message =

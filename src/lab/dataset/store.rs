@@ -183,12 +183,15 @@ impl<'p> Store<'p> {
         })
     }
 
-    /// True if nothing of another's is in the folder: a run that was killed at once leaves the plan, or a part of it.
+    /// True if nothing of another's is in the folder: a run that was killed at once leaves this plan, or a part of it.
     fn is_empty(&self) -> bool {
-        let ours = |name: &str| [PLAN, MANIFEST].contains(&files::draft_of(name).unwrap_or(name));
-        std::fs::read_dir(&self.root).map_or(true, |all| {
-            all.flatten().all(|entry| ours(&entry.file_name().to_string_lossy()))
-        })
+        let this =
+            |path: &Path| std::fs::read(path).is_ok_and(|t| t == self.plan.text().as_bytes());
+        let ours = |entry: &std::fs::DirEntry| match entry.file_name().to_string_lossy() {
+            name if name == PLAN => this(&entry.path()),
+            name => files::draft_of(&name).is_some_and(|of| [PLAN, MANIFEST].contains(&of)),
+        };
+        std::fs::read_dir(&self.root).map_or(true, |all| all.flatten().all(|entry| ours(&entry)))
     }
 
     /// True if any file of a part is there.

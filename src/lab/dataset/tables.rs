@@ -5,13 +5,15 @@ use std::ops::Range;
 use serde::Deserialize;
 use toml::Table;
 
-use super::plan::{Array, Format, Segmented};
+use super::plan::{Array, Format, PART, Segmented};
 use crate::scene::SceneError;
 use crate::scene::file::Document;
 use crate::settings::{Quality, suggest};
 
 /// Most samples of a plan: their numbers have nine digits.
 const MAX_SAMPLES: u64 = 1_000_000_000;
+/// Most parts of a plan: each is a file or more in one folder.
+const MAX_PARTS: u64 = 1_000_000;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -76,6 +78,11 @@ pub(super) fn arrays(document: &Document<'_>, names: &[String]) -> Result<Vec<Ar
             document.fail(&format!("arrays.{i}"), format!("there is no array `{name}`"), remedy)
         })
     };
+    let said_before = |i: usize| names[..i].contains(&names[i]);
+    if let Some(i) = (0..names.len()).find(|&i| said_before(i)) {
+        let message = format!("`{}` stands here twice", names[i]);
+        return Err(document.fail(&format!("arrays.{i}"), message, "leave out one of them"));
+    }
     names.iter().enumerate().map(found).collect()
 }
 
@@ -102,6 +109,12 @@ pub(super) fn outlines(document: &Document<'_>, table: &PlanTable) -> Result<(),
             "name one: \"folder\", \"webdataset\", \"zea\" or \"uff\"",
         );
     }
+    if let Some(i) =
+        (0..table.formats.len()).find(|&i| table.formats[..i].contains(&table.formats[i]))
+    {
+        let message = "this format stands here twice".to_owned();
+        return fail(&format!("formats.{i}"), message, "leave out one of them");
+    }
     if table.samples_per_part == Some(0) {
         return fail("samples_per_part", "a part of no samples".to_owned(), "give at least 1");
     }
@@ -116,6 +129,15 @@ pub(super) fn outlines(document: &Document<'_>, table: &PlanTable) -> Result<(),
     if total > MAX_SAMPLES {
         let remedy = format!("the limit is {MAX_SAMPLES}: make several plans");
         return fail("scene", format!("these are {total} samples"), &remedy);
+    }
+    let parts = total.div_ceil(u64::from(table.samples_per_part.unwrap_or(PART)));
+    if parts > MAX_PARTS {
+        let at = if table.samples_per_part.is_some() { "samples_per_part" } else { "scene" };
+        let remedy = format!(
+            "the limit is {MAX_PARTS}: set samples_per_part to {} or more",
+            total.div_ceil(MAX_PARTS)
+        );
+        return fail(at, format!("{total} samples make {parts} parts"), &remedy);
     }
     for (i, scene) in table.scene.iter().enumerate() {
         let at = format!("scene.{i}");

@@ -42,7 +42,11 @@ struct Outbox {
     tracking_sent: Option<Instant>,
     /// True where nothing follows the answers that wait.
     dismissed: bool,
+    /// The reason for which it has been asked to go.
+    unwanted: Option<String>,
     closed: bool,
+    /// Arrival of its last message, or its own.
+    heard: Instant,
 }
 
 pub(super) struct Client {
@@ -85,7 +89,9 @@ impl Client {
                 wants: Subscriptions { image: true, transform: true, tracking: None },
                 tracking_sent: None,
                 dismissed: false,
+                unwanted: None,
                 closed: false,
+                heard: Instant::now(),
             }),
             changed: Condvar::new(),
         }
@@ -116,6 +122,27 @@ impl Client {
     /// Changes the messages that it receives unasked.
     pub fn choose(&self, change: impl FnOnce(&mut Subscriptions)) {
         change(&mut self.outbox.lock().wants);
+    }
+
+    /// Notes that a message of its comes.
+    pub fn hear(&self) {
+        self.outbox.lock().heard = Instant::now();
+    }
+
+    /// Time since its last message; none where it has been asked to go, or has gone.
+    pub fn silence(&self) -> Option<Duration> {
+        let outbox = self.outbox.lock();
+        (!outbox.closed && outbox.unwanted.is_none()).then(|| outbox.heard.elapsed())
+    }
+
+    /// Asks it to go: the thread that waits for its messages ends the connection.
+    pub fn ask_to_go(&self, why: String) {
+        self.outbox.lock().unwanted = Some(why);
+    }
+
+    /// The reason for which it has been asked to go.
+    pub fn unwanted(&self) -> Option<String> {
+        self.outbox.lock().unwanted.clone()
     }
 
     /// Sends a last message, and nothing after it.

@@ -81,9 +81,10 @@ fn dismiss(client: &Client, why: &str) {
 fn receive(client: &Client, shared: &Shared) -> Result<bool, Fault> {
     let mut source = MessageStream::new(&client.stream, &shared.settings);
     let mut header = [0; HEADER];
-    if !source.first(&mut header[..1])? {
+    if !source.first(&mut header[..1], || client.unwanted())? {
         return Ok(false);
     }
+    client.hear();
     source.fill(&mut header[1..])?;
     let header = Header::decode(&header).map_err(|why| Fault::Connection(why.to_string()))?;
     if !answer::is_understood(&header) {
@@ -133,9 +134,13 @@ impl<'s> MessageStream<'s> {
         Self { stream, limit: settings.message_timeout, end: Instant::now() }
     }
 
-    /// Waits for the first byte without limit; the message's time begins with it. Returns false where
-    /// the connection has ended.
-    fn first(&mut self, byte: &mut [u8]) -> Result<bool, Fault> {
+    /// Waits for the first byte, for as long as there is no reason to end the connection; the message's time begins with it.
+    /// Returns false where the connection has ended.
+    fn first(
+        &mut self,
+        byte: &mut [u8],
+        reason: impl Fn() -> Option<String>,
+    ) -> Result<bool, Fault> {
         loop {
             match self.stream.read(byte) {
                 Ok(0) => return Ok(false),
@@ -143,7 +148,11 @@ impl<'s> MessageStream<'s> {
                     self.end = Instant::now() + self.limit;
                     return Ok(true);
                 }
-                Err(error) if waits(&error) => {}
+                Err(error) if waits(&error) => {
+                    if let Some(why) = reason() {
+                        return Err(Fault::Connection(why));
+                    }
+                }
                 Err(error) if has_left(&error) => return Ok(false),
                 Err(error) => return Err(Fault::Connection(format!("receiving: {error}"))),
             }

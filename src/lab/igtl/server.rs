@@ -64,8 +64,11 @@ impl IgtlError {
 pub struct ServerSettings {
     /// The tool that moves the probe, and its calibration.
     pub tracker: Tracker,
-    /// Most clients at a time; further ones are told so and disconnected.
+    /// Most clients at a time. A further one takes the place of the one that has been silent longest, if for [`Self::silence`];
+    /// else it is told so and disconnected.
     pub clients: usize,
+    /// Time without a message after which a client gives way to another.
+    pub silence: Duration,
     /// Time between the first and the last byte of a message from a client; messages that are
     /// skipped have a second more for each megabyte.
     pub message_timeout: Duration,
@@ -81,6 +84,7 @@ impl ServerSettings {
         Self {
             tracker,
             clients: 8,
+            silence: Duration::from_secs(60),
             message_timeout: Duration::from_secs(5),
             send_timeout: Duration::from_secs(20),
             skipped_bytes: 1 << 30,
@@ -336,7 +340,7 @@ impl Acceptor {
     fn let_in(&mut self, stream: TcpStream, peer: SocketAddr) -> std::io::Result<()> {
         let most = self.shared.settings.clients;
         // Threads, not connections: one that is ending still takes room.
-        if self.threads.len() >= most {
+        if self.threads.len() >= most && !self.make_room() {
             self.shared.count(|status| status.refused += 1);
             self.shared.tell();
             return self.refuse(stream, most);
@@ -374,6 +378,22 @@ impl Acceptor {
         });
         self.shared.tell();
         Ok(())
+    }
+
+    /// Asks the client that has been silent longest to go; returns false where none has been silent for long enough. There is
+    /// one more than may be until it has gone.
+    fn make_room(&self) -> bool {
+        let silent = self.threads.iter().filter_map(|(c, _)| Some((c, c.silence()?)));
+        let longest = silent.max_by_key(|(_, silence)| *silence);
+        let least = self.shared.settings.silence;
+        let Some((client, silence)) = longest.filter(|(_, silence)| *silence >= least) else {
+            return false;
+        };
+        client.ask_to_go(format!(
+            "nothing came from it for {:.0} s, and another client needs its place",
+            silence.as_secs_f64()
+        ));
+        true
     }
 
     /// Refuses a client; the message fits into the buffers of a new connection.

@@ -68,7 +68,7 @@ impl Draft {
     /// Makes the folder of the scene.
     ///
     /// # Errors
-    /// There is a scene in it already, unless `force`; it cannot be made.
+    /// There is a scene in it already, unless `force`; its meshes would be written over what is read; it cannot be made.
     pub fn begin(folder: &Path, source: &Path, force: bool) -> Result<Self, FileError> {
         let scene = folder.join(SCENE);
         if scene.exists() && !force {
@@ -76,7 +76,17 @@ impl Draft {
             let remedy = "name another folder, or give --force to replace it";
             return Err(FileError::file(&scene, message, remedy));
         }
-        std::fs::create_dir_all(folder.join(MESHES)).map_err(|e| unwritten(folder, &e))?;
+        let meshes = folder.join(MESHES);
+        let real = |path: &Path| path.canonicalize().ok();
+        if real(&meshes)
+            .zip(real(source))
+            .is_some_and(|(meshes, source)| source.starts_with(meshes))
+        {
+            let message =
+                "is where what is read lies, and the scene's meshes would be written over it";
+            return Err(FileError::file(&meshes, message, "name another folder by -o"));
+        }
+        std::fs::create_dir_all(&meshes).map_err(|e| unwritten(folder, &e))?;
         Ok(Self {
             folder: folder.to_owned(),
             source: source.to_owned(),

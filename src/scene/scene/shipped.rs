@@ -97,8 +97,8 @@ fn folder() -> Option<PathBuf> {
     dirs::data_local_dir().map(|data| data.join("insonify").join(format!("scenes-{STAMP:08x}")))
 }
 
-/// The scene that ships under this name.
-fn named(path: &Path) -> Option<&'static str> {
+/// The scene that ships under this name: `heart`, `heart.toml` or `scenes/heart.toml`.
+pub fn named(path: &Path) -> Option<&'static str> {
     let bare =
         path.parent().is_none_or(|folder| folder.as_os_str().is_empty() || folder == "scenes");
     let stem = path.with_extension("");

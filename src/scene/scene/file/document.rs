@@ -24,12 +24,18 @@ use paths::{find, insert};
 /// Largest scene file, bytes: they hold names and numbers, not meshes.
 const MAX_TEXT: u64 = 4 << 20;
 
+/// Most parts of a path to a value; the longest key of a scene file has six. What is nested deeper than the stack allows
+/// would end the program, whoever sent it.
+const MAX_PARTS: usize = 16;
+
 /// The text of a scene file and of the overrides.
 #[derive(Clone)]
 pub struct Source {
     /// The file; messages name it.
     pub path: PathBuf,
     text: String,
+    /// The page that describes it.
+    manual: &'static str,
     overrides: Vec<Override>,
     /// Meshes that are in no file, by name.
     pub given: BTreeMap<String, Arc<Mesh>>,
@@ -114,7 +120,13 @@ impl Source {
 
     /// A text that is to become the file `path`; no overrides.
     pub fn of(path: &Path, text: String) -> Self {
-        Self { path: path.to_owned(), text, overrides: Vec::new(), given: BTreeMap::new() }
+        let manual = "docs/scenes.md";
+        Self { path: path.to_owned(), text, manual, overrides: Vec::new(), given: BTreeMap::new() }
+    }
+
+    /// The same for a file that another page describes.
+    pub fn described_in(self, manual: &'static str) -> Self {
+        Self { manual, ..self }
     }
 
     /// The file's text, without the overrides.
@@ -130,6 +142,15 @@ impl Source {
             let value = self.table(&set.padded)?.into_iter().next();
             let value = value.expect("the text has one key").1;
             let key = set.start..set.start + set.path.len();
+            if set.segments.len() > MAX_PARTS {
+                let begin: String = set.path.chars().take(24).collect();
+                let message = format!(
+                    "`{begin}...` has {} parts; the path of a setting has at most {MAX_PARTS}",
+                    set.segments.len()
+                );
+                let remedy = "write it as docs/scenes.md does, like `imaging.gain`";
+                return Err(SceneError::file(Path::new("--set"), message, remedy));
+            }
             let segments: Vec<&str> = set.segments.iter().map(String::as_str).collect();
             insert(&mut document.root, &segments, value, &key)
                 .map_err(|(message, remedy)| self.error(key, message, Some(remedy)))?;
@@ -203,7 +224,7 @@ impl Document<'_> {
                 true => self.key_span(&names),
                 false => self.span(&names),
             };
-            let advice = advice(message);
+            let advice = advice(message, self.source.manual);
             let brief = match advice {
                 Some(_) => message.split(", expected").next().unwrap_or(message),
                 None => message,

@@ -81,11 +81,12 @@ impl From<FileError> for SceneError {
     }
 }
 
-/// Advice for the deserializer's "unknown field `x`, expected one of `a`, `b`" and "missing field `x`".
-pub(super) fn advice(message: &str) -> Option<String> {
+/// Advice for the deserializer's "unknown field `x`, expected one of `a`, `b`" and "missing field `x`"; `manual` is the page
+/// that describes the file.
+pub(super) fn advice(message: &str, manual: &str) -> Option<String> {
     if let Some(missing) = message.strip_prefix("missing field `") {
         let key = missing.split('`').next()?;
-        return Some(format!("give `{key}`; docs/scenes.md says what it takes"));
+        return Some(format!("give `{key}`; {manual} says what it takes"));
     }
     if !message.starts_with("unknown field") && !message.starts_with("unknown variant") {
         return None;
@@ -110,13 +111,13 @@ mod tests {
 
     #[test]
     fn advice_names_the_nearest_key() {
-        let advice = advice("unknown field `pathz`, expected one of `paths`, `seed`");
+        let advice = advice("unknown field `pathz`, expected one of `paths`, `seed`", "docs/a.md");
         assert_eq!(advice.as_deref(), Some("did you mean `paths`?"));
     }
 
     #[test]
     fn advice_names_the_missing_key() {
-        let advice = advice("missing field `axis`");
-        assert_eq!(advice.as_deref(), Some("give `axis`; docs/scenes.md says what it takes"));
+        let advice = advice("missing field `axis`", "docs/a.md");
+        assert_eq!(advice.as_deref(), Some("give `axis`; docs/a.md says what it takes"));
     }
 }

@@ -10,6 +10,7 @@ use super::document::{Misfit, Source, element, segments};
 use super::error::SceneError;
 use super::placing::placed;
 use super::schema::File;
+use super::setting::above;
 use super::table::Entry;
 use super::tissues::Tissues;
 use super::{poses, probe, settings, tasks};
@@ -298,6 +299,20 @@ pub fn named_files(path: &Path) -> Option<Vec<PathBuf>> {
     let mut named = Named(Vec::new());
     named.visit_document_mut(&mut document);
     Some(named.0.into_iter().map(|file| folder.join(file)).collect())
+}
+
+/// True if a setting, as `--set` takes it, names a file: by its key, or somewhere in its value.
+pub fn names_files(path: &str, value: &str) -> bool {
+    let parts = segments(path);
+    let table = parts.first().map_or("", String::as_str);
+    if parts.iter().skip(above(table)).any(|key| NAMING.contains(&key.as_str())) {
+        return true;
+    }
+    let mut named = Named(Vec::new());
+    if let Ok(mut document) = format!("value = {value}").parse::<DocumentMut>() {
+        named.visit_document_mut(&mut document);
+    }
+    !named.0.is_empty()
 }
 
 /// Keys whose values are names of files.

@@ -13,7 +13,7 @@ pub struct Setting {
 }
 
 /// Number of a path's parts before its key: `imaging`, or `tissues` and a name.
-fn above(table: &str) -> usize {
+pub(super) fn above(table: &str) -> usize {
     if table == "tissues" || LISTS.contains(&table) { 2 } else { 1 }
 }
 

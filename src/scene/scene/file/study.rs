@@ -162,7 +162,8 @@ impl Plan {
     /// # Errors
     /// The first mistake, with file, line, column and remedy.
     pub fn load(path: &Path) -> Result<Self, SceneError> {
-        let source = Source::of(path, issue::read_text(path, MAX_PLAN, "leave out slices")?);
+        let text = issue::read_text(path, MAX_PLAN, "leave out slices")?;
+        let source = Source::of(path, text).described_in("docs/studies.md");
         let document = source.document()?;
         let table: PlanTable = document.parse_as()?;
         let check = Check { source: &source };

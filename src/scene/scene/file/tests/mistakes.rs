@@ -1,6 +1,7 @@
 //! Every mistake in nodes, selectors, motions, animations and trajectories of scene files.
 
 use super::graph::{BEAT, beating, case, mesh, write};
+use super::{Case, SCENE};
 
 #[test]
 fn mistakes_in_the_family_are_placed() {
@@ -278,4 +279,25 @@ fn mistakes_of_trajectories_are_placed_in_their_file() {
     );
     let many = p(&(1..=200_000).map(|i| format!("{i},0,0,0\n")).collect::<String>());
     csv(&many, (200_002, 1), "at most 200000 rows", "coarsely");
+}
+
+// What is nested deeper than the stack allows ends the program: 12,000 parts came in one message of 24 kB.
+#[test]
+fn paths_of_many_parts_are_refused_wherever_they_come_from() {
+    let case = Case::new();
+    let deep = |parts: usize, part: &str| vec![part; parts].join(".");
+    let mut paths: Vec<_> = [17, 12_000, 300_000].map(|parts| deep(parts, "a")).into();
+    paths.extend([
+        format!("imaging.{}", deep(20_000, "gain")),
+        format!("mesh.0.{}", deep(20_000, "inside")),
+        format!("tissues.{}", deep(20_000, "\"a b\"")),
+    ]);
+    for path in paths {
+        let error = case.load(SCENE, &[(path.as_str(), "1")]).map(|_| ()).expect_err(&path);
+        assert!(error.message.contains("parts; the path of a setting has at most 16"), "{error}");
+        assert!(error.to_string().len() < 200 && error.remedy.is_some(), "{error}");
+    }
+    // In the file itself the parser has its own limit.
+    let text = format!("{SCENE}\n[x]\n{} = 1\n", deep(100_000, "a"));
+    case.load(&text, &[]).map(|_| ()).expect_err("no such table");
 }
