@@ -280,3 +280,83 @@ fn without_a_command_the_window_is_meant_and_says_what_to_do_first() {
     let out = elsewhere(home.path(), &["--help"]);
     assert!(text(&out.stdout).contains("insonify view heart"), "{}", text(&out.stdout));
 }
+
+#[test]
+fn what_is_another_s_is_kept() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| dir.path().join(name);
+    // A file of the name of the sidecar, of another program.
+    std::fs::write(at("a.json"), "{\"mine\": 1}").expect("written");
+    let output = at("a.png");
+    let out = render("scenes/phantom.toml", &["-o", path(&output)]);
+    let told = text(&out.stderr);
+    assert!(out.status.success() && told.contains("a.json is there and is not of"), "{told}");
+    assert_eq!(json(&at("a.json"))["mine"], 1);
+    assert!(image::open(&output).is_ok());
+    // One of its own is replaced.
+    std::fs::remove_file(at("a.json")).expect("there");
+    for gain in ["imaging.gain=3", "imaging.gain=5"] {
+        let out = render("scenes/phantom.toml", &["-o", path(&output), "--set", gain]);
+        assert!(out.status.success() && !text(&out.stderr).contains("is there"));
+    }
+    assert_eq!(json(&at("a.json"))["settings"]["imaging"]["gain"], 5.0);
+
+    // Meshes that are imported into the folder that they lie in.
+    let ball = "v 0 0 0\nv 30 0 0\nv 0 30 0\nv 0 0 30\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+    std::fs::create_dir_all(at("p/meshes")).expect("room");
+    std::fs::write(at("p/meshes/liver.obj"), ball).expect("written");
+    for force in [&[][..], &["--force"]] {
+        let (meshes, into) = (at("p/meshes"), at("p"));
+        let out = insonify(&[&["import", path(&meshes), "-o", path(&into)], force].concat());
+        let told = text(&out.stderr);
+        assert!(!out.status.success() && told.contains("would be written over it"), "{told}");
+        assert!(told.contains("name another folder"), "{told}");
+        assert_eq!(std::fs::read_to_string(at("p/meshes/liver.obj")).expect("there"), ball);
+    }
+
+    // The table of a sheet beside a scene of its name.
+    let scene = at("v.csv");
+    std::fs::write(&scene, "background = \"liver\"\n").expect("written");
+    let out = insonify(&["vary", path(&scene), "-o", path(&at("v.png"))]);
+    let told = text(&out.stderr);
+    assert!(!out.status.success() && told.contains("one file cannot be both"), "{told}");
+    assert_eq!(std::fs::read_to_string(&scene).expect("there"), "background = \"liver\"\n");
+}
+
+#[test]
+fn images_that_are_black_are_told_with_the_reason() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let scene = dir.path().join("s.toml");
+    let head = "background = \"fat\"\n[probe]\npreset = \"linear\"\nscanlines = 32\nsamples = 256\n\
+                elevation_layers = 1\n[imaging]\nimage_height = 100\n";
+    let skin = "[contact]\nmesh = [\"skin\"]\n[[mesh]]\nname = \"skin\"\ntissue = \"liver\"\n\
+                shape = { box = { size = [80, 80, 20] } }\n";
+    let bone = "[[mesh]]\nname = \"x\"\ntissue = \"cortical_bone\"\nshape = { sphere = { radius = 30 } }\n";
+    for (rest, in_check, in_render) in [
+        (format!("{skin}translate = [0, 0, -100]\n"), "touches the skin", "touches the skin"),
+        (format!("{skin}translate = [0, 0, 12]\n"), "", ""),
+        (bone.to_owned(), "start inside `cortical_bone`", "start inside `cortical_bone`"),
+        (bone.replace("cortical_bone", "liver"), "", ""),
+    ] {
+        std::fs::write(&scene, format!("{head}{rest}")).expect("written");
+        let out = insonify(&["check", path(&scene)]);
+        let told = text(&out.stdout) + &text(&out.stderr);
+        assert!(out.status.success(), "{told}");
+        assert_eq!(told.contains("warning: "), !in_check.is_empty(), "{told}");
+        assert!(told.contains(in_check), "{told}");
+        let png = dir.path().join("s.png");
+        let out = insonify(&["render", path(&scene), "--quality", "draft", "-o", path(&png)]);
+        let told = text(&out.stderr);
+        assert!(out.status.success() && told.contains(in_render), "{told}");
+        assert!(!in_render.is_empty() || !told.contains("black"), "{told}");
+    }
+    std::fs::write(&scene, format!("{head}gain = -200\n")).expect("written");
+    let png = dir.path().join("s.png");
+    let out = insonify(&["render", path(&scene), "--quality", "draft", "-o", path(&png)]);
+    assert!(text(&out.stderr).contains("the last image is black"), "{}", text(&out.stderr));
+    // What many devices refuse.
+    std::fs::write(&scene, format!("{head}gain = 0\n").replace("= 100", "= 8192"))
+        .expect("written");
+    let out = insonify(&["check", path(&scene)]);
+    assert!(text(&out.stdout).contains("lower imaging.image_height"), "{}", text(&out.stdout));
+}

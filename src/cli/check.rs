@@ -6,7 +6,9 @@ use std::process::ExitCode;
 use clap::Args;
 use insonify::output;
 use insonify::scene::{Issue, check};
+use insonify::sim::beyond_some_devices;
 use insonify::sim::calibration::Work;
+use insonify::sim::contact::{Coupling, REACH_SKIN, Skins, UNTOUCHED};
 use insonify::volume::{self, Format, Summary, Volume};
 
 /// Arguments of `insonify check`.
@@ -28,6 +30,15 @@ impl Check {
         if let Some(Work { too_much, message, remedy }) = report.scene.as_ref().and_then(Work::of) {
             let make = if too_much { Issue::error } else { Issue::warning };
             report.issues.push(make(&self.file, 1, message, remedy.to_owned()));
+        }
+        if let Some((message, remedy)) = report.scene.as_ref().and_then(beyond_some_devices) {
+            report.issues.push(Issue::warning(&self.file, 1, message, remedy.to_owned()));
+        }
+        let touch = report.scene.as_ref().and_then(|s| Coupling::of(s, &mut Skins::default()));
+        if touch.is_some_and(|coupling| coupling.touch.share == 0.0) {
+            let warning =
+                Issue::warning(&self.file, 1, UNTOUCHED.to_owned(), REACH_SKIN.to_owned());
+            report.issues.push(warning);
         }
         output::line(&report);
         let passed = report.passed();

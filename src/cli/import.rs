@@ -8,6 +8,7 @@ use glam::{DAffine3, DVec3};
 use insonify::import::table::{self, Table};
 use insonify::import::{self, Draft, LabelMap, Options};
 use insonify::output;
+use insonify::scene::Scene;
 use insonify::scene::mesh::Units;
 use insonify::scene::tissue::table as tissues;
 use insonify::settings::suggest;
@@ -180,6 +181,8 @@ fn device_set(source: &Path, folder: &Path, args: &Import) -> Result<()> {
     let scene = import::device_set::import(source, folder, &poses, args.force)?;
     notes(&scene.issues);
     let path = scene.finish()?;
+    // What of it can be seen is known with the probe's pose and all meshes.
+    notes(Scene::load(&path, &[])?.1);
     remarks(&scene.draft);
     for part in &scene.draft.parts {
         output::line(format!("{}: {} triangles, {:.1} ml", part.name, part.triangles, part.volume));

@@ -11,6 +11,7 @@ use insonify::output;
 use insonify::scene::{Scene, file, shipped};
 use insonify::settings::{Group as _, ScatterMode, Simulation};
 use insonify::sim::calibration::Calibration;
+use insonify::sim::contact::{REACH_SKIN, UNTOUCHED};
 use insonify::sim::dump;
 use insonify::sim::facts;
 use insonify::sim::shaders::Library;
@@ -119,6 +120,15 @@ pub fn run(args: &Render) -> Result<()> {
         output::note(format!("warning: {lost}"));
     }
     let contact = simulator.contact();
+    if contact.is_some_and(|touch| touch.share == 0.0) {
+        output::note(format!("warning: {UNTOUCHED}; {REACH_SKIN}"));
+    } else if is_black(&mut simulator)? {
+        output::note(format!(
+            "warning: the last image is black: see imaging.gain, the time-gain compensation, and what lies before the probe \
+             (insonify check {})",
+            args.scene.display()
+        ));
+    }
     let steps = match args.steps {
         true => Some(steps(&mut simulator, &library, &scene, tracer)?),
         false => None,
@@ -152,6 +162,12 @@ pub fn run(args: &Render) -> Result<()> {
         common::write_json(file, &report)?;
     }
     args.common.validated(&device)
+}
+
+/// True if nothing is seen in the last image.
+fn is_black(simulator: &mut Simulator) -> Result<bool> {
+    let (_, _, rgba) = simulator.pixels().into_diagnostic()?;
+    Ok(rgba.chunks_exact(4).all(|pixel| pixel[..3] == [0; 3]))
 }
 
 /// Refuses files of which one would replace another. Figures may be written into the sidecar: they say all that it does.

@@ -80,7 +80,7 @@ use outputs::Last;
 pub use outputs::Outputs;
 use pass_kernels::PassKernels;
 use passes::Passes;
-pub use resize::image_size;
+pub use resize::{beyond_some_devices, image_size};
 use shaders::Library;
 use sources::{Sources, TableCache};
 use stages::{AXIAL, BEAM, CHART, DISPLAY, LABEL, LEVEL, SCATTER};

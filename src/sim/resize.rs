@@ -43,3 +43,53 @@ impl Simulator {
 pub fn image_size(scene: &Scene) -> [u32; 2] {
     super::tables::raster(scene).0
 }
+
+/// Bytes that every device of Vulkan takes in one buffer (maxStorageBufferRange, Vulkan 1.3, 49.1); software drivers take no
+/// more.
+const EVERYWHERE: u64 = 1 << 27;
+
+/// The buffer of a frame that grows with settings alone and is larger than every device takes, with the remedy; none as a rule.
+pub fn beyond_some_devices(scene: &Scene) -> Option<(String, &'static str)> {
+    let [width, height] = image_size(scene).map(u64::from);
+    let lines = u64::from(scene.probe.scanlines) * u64::from(scene.probe.samples);
+    let buffers = [
+        (
+            format!("an image of {width} x {height} pixels"),
+            4 * width * height,
+            "lower imaging.image_height",
+        ),
+        (
+            format!("{} scanlines of {} samples", scene.probe.scanlines, scene.probe.samples),
+            8 * lines,
+            "lower probe.scanlines or probe.samples",
+        ),
+    ];
+    let (what, bytes, remedy) = buffers.into_iter().find(|(_, bytes, _)| *bytes > EVERYWHERE)?;
+    let message = format!(
+        "{what} take {} MiB in one buffer; devices need not take more than {}, and drivers without a GPU do not",
+        bytes >> 20,
+        EVERYWHERE >> 20
+    );
+    Some((message, remedy))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::probe::Probe;
+    use crate::scene::Tissue;
+
+    #[test]
+    fn what_some_devices_refuse_is_told() {
+        let liver = Tissue::shipped("liver").expect("shipped");
+        let mut scene = Scene::homogeneous(liver, Probe::paper_table1());
+        assert_eq!(beyond_some_devices(&scene), None);
+        scene.imaging.image_height = 8192;
+        let told = beyond_some_devices(&scene).expect("too high");
+        assert!(told.0.contains("x 8192 pixels") && told.1.contains("image_height"), "{told:?}");
+        scene.imaging.image_height = 400;
+        (scene.probe.scanlines, scene.probe.samples) = (4096, 65_536);
+        let told = beyond_some_devices(&scene).expect("too many");
+        assert!(told.0.contains("2048 MiB") && told.1.contains("probe.samples"), "{told:?}");
+    }
+}

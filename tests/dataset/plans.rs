@@ -184,7 +184,7 @@ fn plans_of_many_samples_are_checked_soon_and_of_more_parts_than_a_folder_holds_
         let (plan, _) = plan(samples, part).expect("a plan");
         let run = Run { plan: &plan, root: &desk.path("made"), shard: [0, 1], resume: false };
         let checked = run.check().expect("all fit");
-        assert!((10_000..=MOST_CHECKED).contains(&checked), "{samples}: {checked}");
+        assert!((MOST_CHECKED / 2..=MOST_CHECKED).contains(&checked), "{samples}: {checked}");
         // A shard of it that is small enough is checked whole.
         let shard = Run { shard: [0, 100_000], ..run };
         if shard.samples() <= MOST_CHECKED {

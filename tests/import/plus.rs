@@ -163,6 +163,36 @@ fn a_device_set_of_plus_shows_its_surfaces_where_the_image_plane_cuts_them() {
     assert!(borders > 60 && worst < 0.2, "{borders} {worst}");
 }
 
+// PLUS takes coordinates as they are written: a frame that the mesh states is another program's.
+#[test]
+fn bodies_of_a_device_set_lie_where_it_says_whatever_frame_they_state_and_none_is_lost_unseen() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let folder = folder.path();
+    device_set(folder);
+    tracker_only(folder);
+    let import = |out: &str| {
+        insonify(folder, &["import", "set.xml", "-o", out, "--sequence", "track.igs.mha"])
+    };
+    let mesh = |out: &str| std::fs::read(folder.join(out).join("meshes/ball.obj")).expect("a mesh");
+    let (done, said) = import("plain");
+    assert!(done && !said.contains("RAS") && !said.contains("beside"), "{said}");
+    let ball = std::fs::read_to_string(folder.join("ball.obj")).expect("there");
+    for frame in ["RAS", "LPS"] {
+        let text = format!("# 3D Slicer output. SPACE={frame}\n{ball}");
+        std::fs::write(folder.join("ball.obj"), text).expect("written");
+        let (done, said) = import(frame);
+        assert!(done && said.contains("taken as it is written") == (frame == "RAS"), "{said}");
+        assert!(mesh(frame) == mesh("plain"), "{frame}");
+    }
+    // Far from the image.
+    let set = std::fs::read_to_string(folder.join("set.xml")).expect("there");
+    let far = DAffine3::from_translation(DVec3::new(0.0, 400.0, 0.0)) * model_to_object();
+    let far = set.replace(&sixteen(model_to_object()), &sixteen(far));
+    std::fs::write(folder.join("set.xml"), far).expect("written");
+    let (done, said) = import("far");
+    assert!(done && said.contains("no mesh is in the image: the nearest, `Ball`"), "{said}");
+}
+
 #[test]
 fn tracked_poses_become_a_trajectory_with_and_without_a_transducer() {
     let folder = tempfile::tempdir().expect("temporary folder");

@@ -10,8 +10,8 @@ use super::{DatasetError, Gallery, Part, Plan, Store, Studio, Told};
 use crate::gpu::Device;
 use crate::sim::Tracer;
 
-/// Most samples of a shard whose draws are checked before it is made: some seconds of work.
-pub const MOST_CHECKED: u32 = 20_000;
+/// Most samples of a shard whose draws are checked before it is made: a second of work.
+pub const MOST_CHECKED: u32 = 4000;
 
 /// A shard that is to be made.
 pub struct Run<'p> {

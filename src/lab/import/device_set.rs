@@ -64,7 +64,9 @@ pub fn import(
             }
         };
         let file = find(path, model)?;
-        let (read, found) = mesh::load(&file, &mesh::Options::default()).map_err(|issues| {
+        // PLUS takes coordinates as they are written, and its transforms lead from there.
+        let options = mesh::Options { as_written: true, ..mesh::Options::default() };
+        let (read, found) = mesh::load(&file, &options).map_err(|issues| {
             let worst = issues.into_iter().find(Issue::is_error).expect("a reason");
             FileError::file(&file, worst.message, worst.remedy)
         })?;

@@ -3,10 +3,11 @@
 mod coincident;
 mod enclosing;
 mod fusion;
-mod gas;
 mod mesh;
 mod nodes;
 mod report;
+mod seen;
+mod starts;
 
 pub use mesh::{Facts, SENSIBLE_SIZE};
 pub(super) use mesh::{examine, examine_shape};

@@ -179,6 +179,8 @@ impl Scene {
             tasks::build(&document, &file.task, &scene.poses, &scene.meshes, &scene.instances)?;
         warnings.extend(scene.coincidences(path));
         warnings.extend(scene.lines_in_gas(path));
+        warnings.extend(scene.lines_in_bone(path));
+        warnings.extend(scene.nothing_in_the_image(path));
         let variants = vary::variants(&document, &file.vary.stated, &scene, suggested)?;
         Ok((scene, variants, warnings))
     }

@@ -126,7 +126,10 @@ fn read_parts(path: &Path, options: &Options) -> Result<Parts, Vec<Issue>> {
         out.issues.push(Issue::warning(path, 1, message, "give it the extension of its format"));
     }
     out.ras |= kind.is_some_and(Kind::is_text) && formats::states_ras(&bytes);
-    if out.ras {
+    if out.ras && options.as_written {
+        let message = "states that its frame is RAS: taken as it is written, as what names it does";
+        out.issues.push(Issue::warning(path, 1, message, ""));
+    } else if out.ras {
         let positions = out.parts.iter_mut().flat_map(|part| &mut part.positions);
         positions.for_each(|[x, y, _]| (*x, *y) = (-*x, -*y));
         let message = "states that its frame is RAS: turned into LPS, in which volumes are";

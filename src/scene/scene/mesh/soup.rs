@@ -56,6 +56,8 @@ pub struct Options {
     pub node: Option<String>,
     /// True where boundary loops are closed by fans to their centres.
     pub cap_openings: bool,
+    /// True where positions are taken as they are written, whatever frame the file states: who asks knows the frame.
+    pub as_written: bool,
     /// Most shapes that are sampled from an animated skin, at least 2; without it 24.
     pub keyframes: Option<usize>,
 }
