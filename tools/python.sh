@@ -3,7 +3,7 @@
 # the module with the features of the other tests, and runs pytest. Arguments go to pytest.
 #   ./tools/python.sh -k labels
 # Exit code 1 too where that environment cannot be made.
-# FEATURES  features of the build, as of the other tests [default: anatomy]
+# FEATURES  features of the build, as of the other tests [default: none]
 set -eu
 cd "$(dirname "$0")/.."
 python=target/python/bin/python
@@ -22,7 +22,7 @@ if [ ! -f "$wanted" ] || [ "$(cat "$wanted")" != "${packages[*]}" ]; then
   echo "${packages[*]}" >"$wanted"
 fi
 # One set of features with the other tests: only the module itself is built anew, and the program that its tests compare it with.
-cargo build --features "${FEATURES:-anatomy}" --lib --bin insonify
+cargo build --features "${FEATURES:-}" --lib --bin insonify
 cp target/debug/lib_insonify.so python/insonify/_insonify.abi3.so
 "$python" -m mypy --no-error-summary --cache-dir target/mypy python/insonify
 PYTHONPATH=$PWD/python "$python" -m pytest -q -rfEs -p no:cacheprovider python/tests "$@"

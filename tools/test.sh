@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Every test, with all set-up that they need, but for those that compile kernels: `--features compile`
-# adds them, with SHADERC_LIB_DIR set as in .ci/run. As the first argument, `--long` adds the tests
+# adds them, with SHADERC_LIB_DIR set as in .ci/run; and those of the modeller of the shipped anatomy, whose 30 packages nothing
+# else needs, and the program that makes a page of the physics checks: `--features anatomy,validate`. As the first argument, `--long` adds these, and the tests
 # that take minutes or need a quiet machine: statistics over many seeds, physics by both tracers, every kernel on a second
 # driver in every case, how little the processor does for a window at rest. Other arguments go to `cargo test`; those of the Python package (tools/python.sh) follow unless the
 # arguments choose tests.
@@ -15,9 +16,10 @@
 set -eu
 cd "$(dirname "$0")/.."
 started=$SECONDS
-long=()
+long=() features=
 if [ "${1:-}" = --long ]; then
   shift
+  features=anatomy,validate
   long=(--include-ignored)
   # Physics by both tracers (tests/physics/check.rs), the second driver on every case (tools/tests/kernels.rs).
   export INSONIFY_LONG=1
@@ -43,11 +45,10 @@ threads=$(nproc)
 export RUST_TEST_THREADS=${RUST_TEST_THREADS:-$((threads < 4 ? 4 : threads))}
 [ -e ../shared/data ] || echo "no shared data (tests on real meshes)" >>"$INSONIFY_SKIPPED"
 
-features=anatomy
 arguments=() chosen=
 while [ $# -gt 0 ]; do
   case $1 in
-  --features) features=anatomy,$2 && shift 2 ;;
+  --features) features=${features:+$features,}$2 && shift 2 ;;
   --no-fail-fast) shift ;;
   --) shift && long+=("$@") && chosen=1 && break ;;
   *) arguments+=("$1") && chosen=1 && shift ;;

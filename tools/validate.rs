@@ -1,5 +1,5 @@
 //! Every check of the validation table as a page:
-//! `cargo run --release --bin validate [-- --output DIR] [--only T5,T9]` writes `index.html`.
+//! `cargo run --release --features validate --bin validate [-- --output DIR] [--only T5,T9]` writes `index.html`.
 
 use std::path::PathBuf;
 use std::process::ExitCode;
