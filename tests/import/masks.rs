@@ -122,3 +122,67 @@ fn nothing_in_a_folder_is_passed_over_in_silence() {
     let (done, said) = imported(folder);
     assert!(done && said.contains("spleen.nrrd: is a volume beside meshes"), "{said}");
 }
+
+/// The names that TotalSegmentator's task `total` gives its files.
+fn total_segmentator() -> Vec<&'static str> {
+    let table = include_str!("../../src/lab/import/totalsegmentator.csv");
+    let rows = table.lines().filter(|l| !l.starts_with('#')).skip(1);
+    rows.map(|row| row.split(',').nth(1).expect("a name")).collect()
+}
+
+/// A folder as TotalSegmentator leaves it: 117 files, most of them small organs side by side, some that overlap, some empty.
+#[test]
+fn a_folder_of_all_names_of_total_segmentator_becomes_a_scene() {
+    const GRID: [usize; 3] = [72, 60, 48];
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let folder = folder.path();
+    std::fs::create_dir(folder.join("masks")).expect("made");
+    let names = total_segmentator();
+    assert_eq!(names.len(), 117);
+    let is_empty = |i: usize| i % 9 == 4;
+    let place = |i: usize| {
+        let cell = [i % 6, i / 6 % 5, i / 30].map(|n| 12.0 * n as f64 + 5.5);
+        // The second of a pair reaches into the first.
+        if i % 10 == 1 { [cell[0] - 5.0, cell[1], cell[2]] } else { cell }
+    };
+    let of = |i: usize| ball(place(i), 4.6);
+    for (i, name) in names.iter().enumerate() {
+        let inside = of(i);
+        let mask = |p: DVec3| vec![u8::from(!is_empty(i) && inside(p))];
+        std::fs::write(
+            folder.join("masks").join(format!("{name}.nrrd")),
+            nrrd(GRID, "uchar", &mask),
+        )
+        .expect("written");
+    }
+    let (done, said) = imported(folder);
+    assert!(done, "{said}");
+    assert!(!said.contains("had no tissue"), "{said}");
+    let [x, y, z] = GRID;
+    let all = || {
+        (0..x * y * z).map(|at| DVec3::from([at % x, at / x % y, at / (x * y)].map(|n| n as f64)))
+    };
+    let mut overlaps = 0;
+    for (i, name) in names.iter().enumerate() {
+        let empty = format!("note: {name}: has no voxel");
+        assert_eq!(said.contains(&empty), is_empty(i), "{name}: {said}");
+        if is_empty(i) {
+            continue;
+        }
+        // One of a pair has the voxels that both want, the other is told what it loses.
+        let near = [i.wrapping_sub(1), i + 1].into_iter().filter(|&j| j < names.len());
+        let near: Vec<_> = near.filter(|&j| !is_empty(j)).map(of).collect();
+        let own = of(i);
+        let count = |inside: &dyn Fn(DVec3) -> bool| all().filter(|p| inside(*p)).count() as f64;
+        let whole = count(&own);
+        let lost = count(&|p| own(p) && near.iter().any(|other| other(p)));
+        let found = volume(&said, name) / 0.064;
+        let told = said.contains(&format!("note: {name}: {:.1} % of it", 100.0 * lost / whole));
+        let expected = if told { whole - lost } else { whole };
+        overlaps += usize::from(told && lost > 0.0);
+        assert!((found / expected - 1.0).abs() < 0.02, "{name}: {found} of {expected}: {said}");
+    }
+    assert!(overlaps >= 8, "{overlaps}");
+    let (passed, said) = insonify(folder, &["check", "out/scene.toml"]);
+    assert!(passed && said.contains("0 errors"), "{said}");
+}

@@ -107,12 +107,14 @@ impl Table {
     }
 }
 
-/// Words of a name for comparison: lower case, singular, split where letters end and where capitals begin.
+/// Words of a name for comparison: lower case, singular, split where letters end, where digits begin or end, and where
+/// capitals begin.
 fn words(name: &str) -> Vec<String> {
     let mut split = String::new();
     let mut last = ' ';
     for c in name.chars() {
-        if last.is_lowercase() && c.is_uppercase() {
+        let digits = [last, c].map(char::is_numeric);
+        if last.is_lowercase() && c.is_uppercase() || digits[0] != digits[1] {
             split.push(' ');
         }
         split.push(c);
@@ -130,9 +132,22 @@ fn singular(word: String) -> String {
     }
 }
 
+/// Vertebrae by their letters, and how many there are of each.
+const VERTEBRAE: [(&str, u32); 4] = [("c", 7), ("t", 12), ("th", 12), ("l", 5)];
+
+/// True for a name that is a vertebra's number alone: `T12`, `L 5`.
+fn is_vertebra(words: &[String]) -> bool {
+    let [letter, number] = words else { return false };
+    let count = VERTEBRAE.iter().find(|(name, _)| name == letter).map_or(0, |(_, count)| *count);
+    number.parse().is_ok_and(|number| (1..=count).contains(&number))
+}
+
 /// The row that fits a name best: of most words, then the one whose last word stands last in the name.
 fn best<'r>(rows: &'r [Row], name: &str) -> Option<&'r Row> {
-    let words = words(name);
+    let mut words = words(name);
+    if is_vertebra(&words) {
+        words = vec!["vertebra".to_owned()];
+    }
     let fit = |row: &Row| {
         let places: Option<Vec<usize>> =
             row.words.iter().map(|w| words.iter().rposition(|n| n == w)).collect();
@@ -280,6 +295,59 @@ mod tests {
             ("subcutaneous_fat", "fat"),
             ("skeletal_muscle", "muscle"),
             ("liver_cysts", "cyst_fluid"),
+            // Colour tables and lists of anatomists.
+            ("Rib10", "cortical_bone"),
+            ("Lumbar3", "cortical_bone"),
+            ("Thoracic12", "cortical_bone"),
+            ("T12", "cortical_bone"),
+            ("L5", "cortical_bone"),
+            ("Th 7", "cortical_bone"),
+            ("C7", "cortical_bone"),
+            ("vertebrae_T4", "cortical_bone"),
+            ("L6", "?"),
+            ("T13", "?"),
+            ("T12 weighted", "?"),
+            ("right renal pelvis", "urine"),
+            ("Pelvis renalis dextra", "urine"),
+            ("renal cortex", "kidney"),
+            ("bony pelvis", "cortical_bone"),
+            ("porta", "blood"),
+            ("Portal vein", "blood"),
+            ("portal_triad", "blood"),
+            ("Vena portae hepatis", "blood"),
+            ("Porta hepatis", "blood"),
+            ("Arteria hepatica communis", "blood"),
+            ("Aorta thoracica", "blood"),
+            ("thoracic aorta", "blood"),
+            ("Abdominal part of aorta", "blood"),
+            ("IVC", "blood"),
+            ("Hepar", "liver"),
+            ("Lobus hepatis dexter", "?"),
+            ("Lien", "spleen"),
+            ("Ren sinister", "kidney"),
+            ("Glandula suprarenalis", "kidney"),
+            ("Vesica urinaria", "urine"),
+            ("Vesica fellea", "bile"),
+            ("Ductus choledochus", "bile"),
+            ("Common hepatic duct", "bile"),
+            ("Right hepatic lobe", "liver"),
+            ("Musculus psoas major", "muscle"),
+            ("Costa VII", "cortical_bone"),
+            ("Os sacrum", "cortical_bone"),
+            ("Costal cartilage of seventh rib", "muscle"),
+            ("Pulmo dexter", "lung"),
+            ("Left upper lobe of lung", "lung"),
+            ("Ventriculus sinister", "blood"),
+            ("mitral valve", "myocardium"),
+            ("Wall of urinary bladder", "muscle"),
+            ("thoracic cavity", "lung"),
+            ("cervical lymph node", "spleen"),
+            ("cervix uteri", "cervix"),
+            ("Intervertebral disc L4/L5", "muscle"),
+            ("inferior vena cava", "blood"),
+            ("sigmoid colon", "muscle"),
+            ("gallstone", "?"),
+            ("gall stones", "cortical_bone"),
             ("Segment_1", "?"),
             ("", "?"),
         ] {
