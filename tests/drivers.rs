@@ -118,3 +118,50 @@ fn a_sine_of_the_least_accuracy_that_vulkan_demands_is_noticed() {
     println!("planted: {:.2} % of the pixels more than a grey level apart", 100.0 * share);
     assert!(share > APART, "{share}");
 }
+
+// A driver of a GPU whose library is gone is passed over by the loader, and images come from the processor.
+#[test]
+fn drivers_that_cannot_be_loaded_are_named() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let broken = folder.path().join("gone_icd.json");
+    let text = r#"{"file_format_version":"1.0.1","ICD":{"library_path":"libgone_vulkan.so.0","api_version":"1.4.303"}}"#;
+    std::fs::write(&broken, text).expect("written");
+    let png = folder.path().join("a.png");
+    let run = |drivers: &str, args: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_insonify"));
+        command.env("VK_DRIVER_FILES", drivers).env("VK_ICD_FILENAMES", drivers);
+        let out = command.args(args).output().expect("it starts");
+        let told =
+            [out.stdout, out.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned());
+        (out.status.success(), told.concat())
+    };
+    let broken = broken.display().to_string();
+    let (went_well, told) = run(&broken, &["info"]);
+    assert!(!went_well && told.contains("libgone_vulkan.so.0"), "{told}");
+    assert!(told.contains("install a GPU driver"), "{told}");
+    let Some(good) = second_driver() else { return };
+    let both = format!("{broken}:{}", good.display());
+    let (went_well, told) = run(&both, &["info"]);
+    assert!(went_well && told.contains("a driver could not be loaded: libgone_vulkan"), "{told}");
+    let render = [
+        "render",
+        "scenes/phantom.toml",
+        "--quality",
+        "draft",
+        "--set",
+        "probe.scanlines=16",
+        "-o",
+    ];
+    let render = [&render[..], &[png.to_str().expect("plain")]].concat();
+    let (went_well, told) = run(&both, &render);
+    assert!(went_well && told.contains("images are made on the processor"), "{told}");
+    // Two of one name, and one by its number.
+    let both = format!("{0}:{0}", good.display());
+    let (_, list) = run(&both, &["info"]);
+    if list.contains("\n1: ") {
+        let (went_well, told) = run(&both, &[&render[..], &["--device", "swift"]].concat());
+        assert!(went_well && told.contains("2 devices are called `swift`: number 0"), "{told}");
+        let (went_well, told) = run(&both, &[&render[..], &["--device", "1"]].concat());
+        assert!(went_well && !told.contains("devices are called"), "{told}");
+    }
+}

@@ -47,7 +47,7 @@ fn buffer_of(device: &Arc<Device>, name: &str, values: &[u32]) -> Buffer {
 
 #[test]
 fn devices_are_listed_with_what_they_lack() {
-    let devices = list_devices().unwrap();
+    let devices = list_devices().unwrap().devices;
     assert!(!devices.is_empty());
     for (index, device) in devices.iter().enumerate() {
         assert_eq!(device.index, index);
@@ -67,7 +67,7 @@ fn an_unknown_device_is_answered_with_the_list() {
         let text = error.to_string();
         assert!(matches!(error, GpuError::UnknownDevice { .. }));
         assert!(text.contains(selector), "{text}");
-        for device in list_devices().unwrap() {
+        for device in list_devices().unwrap().devices {
             assert!(text.contains(&device.name), "{text}");
         }
     }
@@ -75,7 +75,7 @@ fn an_unknown_device_is_answered_with_the_list() {
 
 #[test]
 fn a_device_is_chosen_by_index_or_part_of_its_name() {
-    let first = list_devices().unwrap().remove(0);
+    let first = list_devices().unwrap().devices.remove(0);
     let part = first.name[1..].to_uppercase();
     for selector in ["0".to_owned(), part] {
         let options = DeviceOptions { selector: Some(selector), ..Default::default() };

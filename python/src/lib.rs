@@ -43,7 +43,7 @@ fn devices(py: Python<'_>) -> PyResult<Vec<Bound<'_, PyDict>>> {
         out.set_item("lacks", info.lacks)?;
         Ok(out)
     };
-    all.into_iter().map(dictionary).collect()
+    all.devices.into_iter().map(dictionary).collect()
 }
 
 /// Variables that make Mesa's software driver compile in a third of the time; import sets them.

@@ -1,5 +1,6 @@
 //! `insonify info`: what this machine can run.
 
+use insonify::gpu::{Found, list_devices};
 use insonify::output;
 use miette::{IntoDiagnostic, Result};
 
@@ -13,7 +14,7 @@ pub struct Info {}
 /// No Vulkan loader.
 pub fn run(_: &Info) -> Result<()> {
     output::line(format_args!("insonify {}", env!("CARGO_PKG_VERSION")));
-    let devices = insonify::gpu::list_devices().into_diagnostic()?;
+    let Found { devices, driver_faults } = list_devices().into_diagnostic()?;
     if devices.is_empty() {
         output::line(format_args!(
             "no Vulkan device; install a GPU driver, or the software driver mesa-vulkan-drivers"
@@ -33,6 +34,11 @@ pub fn run(_: &Info) -> Result<()> {
         for lack in &device.lacks {
             output::line(format_args!("   lacks {lack}"));
         }
+    }
+    for fault in driver_faults {
+        output::line(format_args!(
+            "a driver could not be loaded: {fault}; install it again, or remove its file from Vulkan's folder icd.d"
+        ));
     }
     Ok(())
 }

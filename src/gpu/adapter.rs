@@ -2,6 +2,7 @@
 
 use std::ffi::{CStr, CString};
 use std::fmt::Write as _;
+use std::sync::Once;
 
 use ash::{khr, vk};
 
@@ -82,10 +83,20 @@ pub(crate) struct Adapter {
     pub(crate) portability_subset: bool,
 }
 
-/// Every Vulkan device of the machine, usable or not, in the loader's order.
-pub fn list_devices() -> Result<Vec<DeviceInfo>, GpuError> {
+/// What Vulkan finds on a machine.
+#[derive(Clone, Debug)]
+pub struct Found {
+    /// Every device, usable or not, in the loader's order.
+    pub devices: Vec<DeviceInfo>,
+    /// Drivers that the loader could not load, with the cause.
+    pub driver_faults: Vec<String>,
+}
+
+/// The Vulkan devices of the machine, and the drivers that could not be loaded.
+pub fn list_devices() -> Result<Found, GpuError> {
     let instance = Instance::new(false, false)?;
-    Ok(adapters(&instance)?.into_iter().map(|a| a.info).collect())
+    let devices = adapters(&instance)?.into_iter().map(|a| a.info).collect();
+    Ok(Found { devices, driver_faults: instance.driver_faults.clone() })
 }
 
 /// A row per device, for error messages.
@@ -104,6 +115,15 @@ fn table(adapters: &[Adapter]) -> String {
         );
     }
     text
+}
+
+/// Notes that were made.
+static SEVERAL: Once = Once::new();
+static FAULT: Once = Once::new();
+
+/// Notes for the user what is so for all devices that this process opens.
+fn note_once(made: &Once, text: impl FnOnce() -> String) {
+    made.call_once(|| insonify_base::output::note(text()));
 }
 
 /// Test of a device and one of its queue families: true where it can present to the window.
@@ -130,7 +150,17 @@ pub(crate) fn choose(
             let found = match selector.parse::<usize>() {
                 Ok(index) => (index < adapters.len()).then_some(index),
                 Err(_) => {
-                    adapters.iter().position(|a| a.info.name.to_lowercase().contains(&wanted))
+                    let fits = |i: &usize| adapters[*i].info.name.to_lowercase().contains(&wanted);
+                    let all: Vec<_> = (0..adapters.len()).filter(fits).collect();
+                    if let [first, _, ..] = all[..] {
+                        note_once(&SEVERAL, || {
+                            format!(
+                                "{} devices are called `{selector}`: number {first} is taken, and others by their numbers",
+                                all.len()
+                            )
+                        });
+                    }
+                    all.first().copied()
                 }
             };
             let refuse = |problem: String| GpuError::UnknownDevice {
@@ -154,6 +184,15 @@ pub(crate) fn choose(
     match chosen {
         Some(index) => {
             let adapter = adapters.swap_remove(index);
+            if let (AdapterKind::Cpu, Some(fault)) =
+                (adapter.info.kind, instance.driver_faults.first())
+            {
+                note_once(&FAULT, || {
+                    format!(
+                        "warning: images are made on the processor: a driver could not be loaded: {fault}; install it again"
+                    )
+                });
+            }
             match plan(&adapter) {
                 Some(plan) => Ok((adapter, plan)),
                 None => Err(GpuError::Window {
@@ -162,7 +201,7 @@ pub(crate) fn choose(
                 }),
             }
         }
-        None if adapters.is_empty() => Err(GpuError::NoDevice { seen: String::new() }),
+        None if adapters.is_empty() => Err(GpuError::no_device(&instance.driver_faults)),
         None => Err(GpuError::NoDevice { seen: format!(", of these:\n{}", table(&adapters)) }),
     }
 }

@@ -185,3 +185,12 @@ pub enum GpuError {
 pub(crate) fn during(what: impl Into<String>) -> impl FnOnce(vk::Result) -> GpuError {
     move |code| GpuError::Vulkan { code, what: what.into() }
 }
+
+impl GpuError {
+    /// No device at all, on a machine whose drivers have these faults.
+    pub(crate) fn no_device(driver_faults: &[String]) -> Self {
+        let faults =
+            driver_faults.iter().map(|fault| format!("; a driver could not be loaded: {fault}"));
+        Self::NoDevice { seen: faults.collect() }
+    }
+}

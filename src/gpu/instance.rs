@@ -77,6 +77,10 @@ pub(crate) struct Instance {
     pub(crate) validating: bool,
     pub(crate) log: ValidationLog,
     messenger: Option<Messenger>,
+    /// What the loader said of drivers of the machine that it could not load.
+    pub(crate) driver_faults: Vec<String>,
+    /// Where the loader writes that, also while the instance is destroyed.
+    _told: ValidationLog,
     /// Holds the loader's library open; dropped last.
     pub(crate) entry: ash::Entry,
 }
@@ -170,14 +174,27 @@ impl Instance {
         } else if validate {
             info = info.push_next(&mut features);
         }
+        // The loader tells of drivers while it makes the instance, and only then.
+        let told = ValidationLog::default();
+        let mut listening = vk::DebugUtilsMessengerCreateInfoEXT::default()
+            .message_severity(vk::DebugUtilsMessageSeverityFlagsEXT::ERROR)
+            .message_type(vk::DebugUtilsMessageTypeFlagsEXT::GENERAL)
+            .pfn_user_callback(Some(on_message))
+            .user_data(Arc::as_ptr(&told.0).cast_mut().cast());
+        if debug_utils {
+            info = info.push_next(&mut listening);
+        }
         let changing = loader_changes();
-        // SAFETY: all pointers in `info` outlive the call; layers and extensions are offered.
-        let raw = unsafe { entry.create_instance(&info, None) }.map_err(|code| match code {
+        // SAFETY: all pointers in `info` outlive the call; layers and extensions are offered; the log that the callback gets
+        // lives as long as the instance, which holds it.
+        let made = unsafe { entry.create_instance(&info, None) };
+        drop(changing);
+        let driver_faults = driver_faults(&told.take());
+        let raw = made.map_err(|code| match code {
             // The loader's word for a machine without a single driver that answers.
-            vk::Result::ERROR_INCOMPATIBLE_DRIVER => GpuError::NoDevice { seen: String::new() },
+            vk::Result::ERROR_INCOMPATIBLE_DRIVER => GpuError::no_device(&driver_faults),
             code => during("creating the Vulkan instance")(code),
         })?;
-        drop(changing);
         let mut instance = Self {
             raw,
             api_version,
@@ -185,6 +202,8 @@ impl Instance {
             validating: validate,
             log: ValidationLog::default(),
             messenger: None,
+            driver_faults,
+            _told: told,
             entry,
         };
         if validate {
@@ -271,7 +290,21 @@ fn validation_extensions(entry: &ash::Entry) -> Result<Vec<std::ffi::CString>, G
     Ok(extensions)
 }
 
-/// Called by the validation layers, from any thread.
+/// What the loader's errors say of drivers: each once, without its own prefixes.
+fn driver_faults(messages: &[String]) -> Vec<String> {
+    let mut out: Vec<String> = Vec::new();
+    for message in messages {
+        let text = message.splitn(3, ": ").last().unwrap_or_default();
+        // The line after the cause names only the file that is passed over.
+        if text.is_empty() || text.starts_with("loader_") || out.iter().any(|known| known == text) {
+            continue;
+        }
+        out.push(text.to_owned());
+    }
+    out
+}
+
+/// Called by the validation layers and the loader, from any thread.
 unsafe extern "system" fn on_message(
     severity: vk::DebugUtilsMessageSeverityFlagsEXT,
     _kind: vk::DebugUtilsMessageTypeFlagsEXT,

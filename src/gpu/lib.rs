@@ -50,7 +50,7 @@ mod tlas;
 mod transfer;
 mod workgroup;
 
-pub use adapter::{AdapterKind, DeviceInfo, list_devices};
+pub use adapter::{AdapterKind, DeviceInfo, Found, list_devices};
 pub use ahead::{compile_standard_input, set_compiler, try_kernel};
 pub use barrier::Stage;
 pub use blas::{Blas, BlasInput, BlasOptions};

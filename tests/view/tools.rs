@@ -38,7 +38,7 @@ pub fn sidecar(desk: &mut Desk, folder: &Path, name: &str) -> Value {
 pub fn rendered(folder: &Path, still: &Value) -> image::DynamicImage {
     let (scene, picture) = (folder.join("scene.toml"), folder.join("rendered.png"));
     std::fs::write(&scene, SCENE).expect("written");
-    let devices = list_devices().expect("devices");
+    let devices = list_devices().expect("devices").devices;
     let shown = devices.iter().find(|d| still["device"] == format!("{} ({})", d.name, d.driver));
     let device = shown.expect("the window's device").index.to_string();
     let tracer = still["tracer"].as_str().expect("a tracer");
