@@ -95,7 +95,10 @@ impl Console {
             probe::show(ui, &mut desk.model.settings, &mut desk.common.open);
         });
         section(ui, "Image", true, |ui| image::show(ui, &mut desk.model.settings));
-        section(ui, "Poses", false, |ui| poses::show(ui, desk.model, &mut self.poses, now));
+        section(ui, "Poses", false, |ui| match desk.model.examined {
+            true => drop(ui.label(EXAMINED)),
+            false => poses::show(ui, desk.model, &mut self.poses, now),
+        });
         section(ui, "Animation", false, |ui| animation::show(ui, desk.model, now));
         section(ui, "Probe input", false, |ui| input::show(ui, desk));
         let (settings, lattice) = (&mut desk.model.settings, desk.model.file.lattice);
@@ -110,7 +113,10 @@ impl Console {
                 registration::show(ui, desk.model, &mut desk.common.open);
             });
         }
-        self.anatomy(ui, desk.model, now);
+        match desk.model.examined {
+            true => section(ui, "Tissues and surfaces", false, |ui| drop(ui.label(EXAMINED))),
+            false => self.anatomy(ui, desk.model, now),
+        }
     }
 
     fn anatomy(&mut self, ui: &mut Ui, model: &mut Model, now: Instant) {
@@ -133,6 +139,9 @@ impl Console {
         }
     }
 }
+
+/// What stands in sections that would name what is to be found.
+const EXAMINED: &str = "Hidden while a task of an examination is under way.";
 
 fn section(ui: &mut Ui, name: &str, open: bool, add: impl FnOnce(&mut Ui)) {
     CollapsingHeader::new(RichText::new(name).strong()).default_open(open).show(ui, add);

@@ -161,6 +161,8 @@ impl Panel for Lesson {
         let (lesson, model, now) = (self, &mut *desk.model, desk.seen.now);
         lesson.open = desk.common.open.has(&ROW);
         let guides = lesson.guides();
+        model.examined = lesson.run.is_some() && lesson.examiner;
+        let looked_up = std::mem::take(&mut model.looked_up);
         if let Some(run) = &mut lesson.run {
             run.recorder.note("lesson", model.pose, now);
             // Also where a key has switched it on.
@@ -168,7 +170,7 @@ impl Panel for Lesson {
                 model.layer.shown = false;
                 model.touch(now);
             }
-            run.guided |= guides || model.layer.shown;
+            run.guided |= guides || model.layer.shown || looked_up;
         }
         if let Some(marking) = &lesson.marking
             && let Some(found) = marking.done()
@@ -239,7 +241,8 @@ fn before(ui: &mut Ui, model: &mut Model, lesson: &mut Lesson, now: Instant) {
         (lesson.result, lesson.problem) = (None, None);
     }
     ui.label(&model.tasks[lesson.chosen].text);
-    ui.checkbox(&mut lesson.examiner, "Examination").on_hover_text("Without guide and overlay");
+    ui.checkbox(&mut lesson.examiner, "Examination")
+        .on_hover_text("Without guide and overlay, poses of the scene, and names of what is seen");
     ui.horizontal(|ui| {
         ui.label("Learner");
         let field = TextEdit::singleline(&mut lesson.learner).desired_width(150.0);

@@ -102,6 +102,10 @@ pub struct Model {
     pub layer: Layer,
     /// Tasks of the scene.
     pub tasks: Vec<Task>,
+    /// True while a task is under way in an examination: nothing names what is to be found, and nothing leads there.
+    pub examined: bool,
+    /// True once a pose of the list was chosen or a name was looked up, until the lesson has noted it.
+    pub looked_up: bool,
     /// Named poses of the probe, and those that the file has.
     poses: Vec<KnownPose>,
     filed_poses: Vec<NamedPose>,
@@ -216,6 +220,8 @@ impl Model {
             real: Real::default(),
             layer: Layer::default(),
             tasks: scene.tasks.clone(),
+            examined: false,
+            looked_up: false,
             poses: KnownPose::of(&scene.poses),
             filed_poses: scene.poses.clone(),
             sheet: Sheet::default(),

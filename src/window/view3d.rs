@@ -264,7 +264,7 @@ impl Panel for View3dPanel {
         painter.text(below, Align2::LEFT_BOTTOM, hint, font, style::FAINT);
         compass::show(ui, &place, &mut model.view3d);
         buttons(ui, &place, model, self);
-        if self.tissues {
+        if self.tissues && !model.examined {
             tissues::show(ui, place.rect, &mut model.view3d.shown);
         }
         self.place = Some(place);

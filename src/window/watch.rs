@@ -26,6 +26,9 @@ struct Watched {
     /// The state at the last look: what still changes is being written.
     last: Vec<Stamp>,
     changed: bool,
+    /// True while the scene file is not there, and until that is told.
+    gone: bool,
+    untold: bool,
 }
 
 /// Watches the files of one scene. Its thread ends after it.
@@ -69,7 +72,13 @@ impl Watch {
         }
         let known = stamps(&files);
         let changed = watched.changed && watched.files.first() == files.first();
-        *watched = Watched { files, last: known.clone(), known, changed };
+        let last = known.clone();
+        *watched = Watched { files, last, known, changed, ..Watched::default() };
+    }
+
+    /// Returns, once, whether the scene file is no longer there.
+    pub(super) fn take_gone(&self) -> bool {
+        std::mem::take(&mut self.0.lock().untold)
     }
 
     /// Returns, once, whether something has changed.
@@ -79,10 +88,18 @@ impl Watch {
 }
 
 impl Watched {
-    /// Compares with a new look; returns whether something has changed, and is written.
+    /// Compares with a new look; returns whether something has changed, and is written, or the scene file is gone.
     fn look(&mut self, now: Vec<Stamp>) -> bool {
         let is_steady = now == self.last;
         self.last = now;
+        // Of no files the first is not gone.
+        let first = |stamps: &[Stamp]| stamps.first().copied().unwrap_or_default();
+        let away = is_steady && !self.last.is_empty() && first(&self.last).is_none();
+        let was_gone = std::mem::replace(&mut self.gone, away);
+        if self.gone && !was_gone && first(&self.known).is_some() {
+            self.untold = true;
+            return true;
+        }
         let is_new = is_steady && self.last != self.known && self.last[0].is_some();
         if is_new {
             self.known.clone_from(&self.last);
@@ -118,13 +135,37 @@ mod tests {
             (at(3), at(1), false),
             // Replaced by an editor that removes it first; a mesh that is gone counts.
             (None, at(1), false),
-            (None, at(1), false),
             (at(3), None, false),
             (at(3), None, true),
+            (at(3), None, false),
         ];
         for (i, (scene, mesh, told)) in looks.into_iter().enumerate() {
             assert_eq!(watched.look(vec![scene, mesh]), told, "{i}");
+            assert_eq!(std::mem::take(&mut watched.changed), told, "{i}");
         }
+        // The scene file itself stays away: told once, and again when it has been back.
+        for (i, (scene, told)) in [
+            (None, false),
+            (None, true),
+            (None, false),
+            (at(3), false),
+            (None, false),
+            (None, true),
+        ]
+        .into_iter()
+        .enumerate()
+        {
+            assert_eq!(watched.look(vec![scene, None]), told, "{i}");
+            assert_eq!(std::mem::take(&mut watched.untold), told, "{i}");
+            assert!(!watched.changed, "{i}");
+        }
+    }
+
+    #[test]
+    fn nothing_is_watched_at_first_and_nothing_is_told_of_it() {
+        let mut watched = Watched::default();
+        assert!(!watched.look(Vec::new()) && !watched.look(Vec::new()));
+        assert!(!watched.untold && !watched.changed);
     }
 
     #[test]

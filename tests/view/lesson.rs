@@ -246,6 +246,12 @@ fn an_examination_hides_guide_and_overlay() {
     desk.click(GUIDE);
     desk.wait_for("the target", |d| green(&d.grab(VIEW)).len() > 20);
     let plain = desk.settle(FREE);
+    // What lies there has a name, but in an examination.
+    const SPOT: (u16, u16) = (250, 200);
+    desk.click_right(SPOT);
+    desk.wait_for("the name", |d| difference(&d.grab(FREE), &plain) > 0.5);
+    desk.press(Key::Escape);
+    desk.wait_for("the image alone", |d| difference(&d.grab(FREE), &plain) < 0.5);
     desk.press(Key::Letter('i'));
     desk.wait_for("the colours", |d| difference(&d.grab(FREE), &plain) > 3.0);
     desk.settle(FREE);
@@ -259,5 +265,8 @@ fn an_examination_hides_guide_and_overlay() {
     assert_eq!(green(&desk.grab(VIEW)), [0; 0], "no target");
     desk.press(Key::Letter('i'));
     assert!(difference(&desk.settle(FREE), &plain) < 1.5, "no colours by the key either");
+    let image = desk.settle(FREE);
+    desk.click_right(SPOT);
+    assert!(difference(&desk.settle(FREE), &image) < 0.5, "no name");
     desk.quit();
 }

@@ -42,7 +42,7 @@ pub use known::{facts, paths, value, value_of_settings};
 pub use paper::paper;
 pub use placing::SCALES;
 pub use probe::stated as stated_pose;
-pub use save::{Note, named_files, names_files, save, save_with};
+pub use save::{Note, named_files, names_files, save, save_text, save_with};
 pub use schema::reference;
 pub use setting::{Setting, setting};
 pub use settings::{load_settings, put_settings};

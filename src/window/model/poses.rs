@@ -70,6 +70,7 @@ impl Model {
 
     /// Puts the probe to a named pose.
     pub fn go_to_pose(&mut self, index: usize, now: Instant) {
+        self.looked_up = true;
         self.place_probe(Source::Pointer, self.poses[index].pose.world_from_probe, now);
     }
 

@@ -6,7 +6,7 @@ use std::time::Instant;
 use glam::DAffine3;
 
 use super::{Model, Settings, entries};
-use crate::scene::file::{Entry, load_settings, save};
+use crate::scene::file::{Entry, load_settings, save, save_text};
 use crate::scene::{Origins, SceneError};
 
 /// The scene file of a session.
@@ -19,6 +19,8 @@ pub struct File {
     /// Edge of its lattice cell times its frequency, mm MHz, before the quality for the device is applied.
     pub lattice: f64,
     pub(super) origins: Origins,
+    /// Its text as it was last read or written: where the file is gone, it is saved from this.
+    text: Option<String>,
 }
 
 #[cfg(test)]
@@ -32,6 +34,7 @@ impl File {
         scene: &crate::scene::Scene,
     ) -> Self {
         Self {
+            text: std::fs::read_to_string(&path).ok(),
             path,
             overrides,
             lattice: entries::lattice(&Settings::of(scene, crate::sim::Tracer::Bvh)),
@@ -78,9 +81,13 @@ impl Model {
     pub fn save(&mut self, to: Option<&Path>, with_pose: bool) -> Result<(), SceneError> {
         let to = to.unwrap_or(&self.file.path).to_owned();
         let changes = self.changes(with_pose);
-        if !changes.is_empty() || to != self.file.path {
-            save(&self.file.path, &to, &changes)?;
+        let from = &self.file.path;
+        match &self.file.text {
+            Some(text) if !from.exists() => save_text(text, from, &to, &changes)?,
+            _ if !changes.is_empty() || to != *from => save(from, &to, &changes)?,
+            _ => {}
         }
+        self.file.text = std::fs::read_to_string(&to).ok().or(self.file.text.take());
         let (before, now) = (entries::lattice(&self.loaded), entries::lattice(&self.settings));
         if !entries::is_same_lattice(before, now) {
             self.file.lattice = now;

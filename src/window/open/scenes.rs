@@ -20,15 +20,24 @@ impl Open {
     /// Begins to open the scene that the user wants, to take up what an earlier session has left, or to read the
     /// scene again whose files have changed.
     pub(crate) fn begin(&mut self, plan: &Plan) {
-        let model = &self.model;
-        if let Some(asked) = self.state.naming.asked.take() {
-            self.state.naming.answer = naming::answer(&plan.scene, model, asked);
+        let asked = self.state.naming.asked.take();
+        if let Some(asked) = asked.filter(|_| !self.model.examined) {
+            self.state.naming.answer = naming::answer(&plan.scene, &self.model, asked);
+            self.model.looked_up = true;
             self.window.request_redraw();
         }
+        let model = &self.model;
         if std::mem::replace(&mut self.saved, model.saves()) != model.saves() {
             // Own writing is no change.
             self.watch.set(&model.file.path);
             recent::add(&model.file.path);
+        }
+        if self.watch.take_gone() {
+            let text =
+                "is no longer there: saving writes it again, as it was read and with all changes";
+            let notices = &mut self.state.common.tools.notices;
+            notices.tell(format!("{} {text}", name(&model.file.path)));
+            self.window.request_redraw();
         }
         let begin = |path, overrides, purpose| {
             Some(Opening::begin(path, overrides, purpose, plan.proxy.clone()))

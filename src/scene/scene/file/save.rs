@@ -45,6 +45,19 @@ pub fn save_with(
     settings: &[Entry],
     notes: &[Note],
 ) -> Result<(), SceneError> {
+    write(&Source::read(from, &[])?, to, settings, notes)
+}
+
+/// Like [`save`], for a file that was at `from` with this text and is gone.
+///
+/// # Errors
+/// Those of [`save`].
+pub fn save_text(text: &str, from: &Path, to: &Path, settings: &[Entry]) -> Result<(), SceneError> {
+    write(&Source::of(from, text.to_owned()), to, settings, &[])
+}
+
+fn write(source: &Source, to: &Path, settings: &[Entry], notes: &[Note]) -> Result<(), SceneError> {
+    let from = &source.path;
     let misfit = |(message, remedy): Misfit| SceneError::file(from, message, &remedy);
     if shipped::is_shipped(to) {
         let cause = "ships with the program and stays as it is".to_owned();
@@ -54,7 +67,6 @@ pub fn save_with(
             "save the scene under another name, in a folder of yours",
         ));
     }
-    let source = Source::read(from, &[])?;
     // The scene file's parser gives an error with a remedy; that of toml_edit has none.
     source.document()?;
     let mut document: DocumentMut = source
@@ -84,7 +96,10 @@ pub fn save_with(
             SceneError::file(path, cause, "name a file in a folder that exists")
         })
     };
-    let (old, new) = (folder(from)?, folder(to)?);
+    // Also where the folder has gone with it.
+    let gone = || Some(std::path::absolute(from).ok()?.parent()?.to_owned());
+    let (old, new) = (folder(from), folder(to)?);
+    let old = old.or_else(|e| gone().ok_or(e))?;
     if old != new {
         Moved { old, new }.visit_document_mut(&mut document);
     }

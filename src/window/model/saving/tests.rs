@@ -135,6 +135,32 @@ fn every_setting_is_saved_and_loaded() {
 }
 
 #[test]
+fn a_scene_file_that_was_deleted_while_it_was_open_is_written_again() {
+    let desk = Desk::new();
+    let mut model = desk.model(&[]);
+    let path = desk.folder.path().join("scene.toml");
+    let change = |model: &mut Model, gain: f64| {
+        let before = model.settings.clone();
+        model.settings.imaging.gain = gain;
+        model.note(&before, Instant::now());
+    };
+    change(&mut model, 3.0);
+    std::fs::remove_file(&path).expect("there");
+    model.save(None, false).expect("saved");
+    hold(&desk, model.settings.clone(), "gone");
+    // The text that was saved counts from now on, elsewhere too; and where nothing was changed.
+    change(&mut model, 4.0);
+    model.save(None, false).expect("saved");
+    std::fs::remove_file(&path).expect("there");
+    let other = desk.folder.path().join("other.toml");
+    model.save(Some(&other), false).expect("saved");
+    assert!(desk.text("other.toml").contains("\"4 dB\"") && !path.exists());
+    std::fs::remove_file(&other).expect("there");
+    model.save(None, false).expect("saved");
+    assert!(desk.text("other.toml").contains("\"4 dB\""));
+}
+
+#[test]
 fn all_settings_at_once_are_saved_and_loaded_again_and_again() {
     let desk = Desk::new();
     let mut model = desk.model(&[]);

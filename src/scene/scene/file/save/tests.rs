@@ -130,6 +130,22 @@ fn elsewhere_files_are_named_from_there() {
     assert_eq!(text, COMMENTED);
 }
 
+// A stick that was pulled, another branch that was checked out.
+#[test]
+fn a_file_that_is_gone_is_saved_from_its_text_also_where_its_folder_is_gone() {
+    let case = Case::new();
+    let gain = settings(&[("imaging.gain", "\"9 dB\"")]);
+    let expected = COMMENTED.replace("\"14 dB\" # loud", "\"9 dB\" # loud");
+    save_text(COMMENTED, &case.path(), &case.path(), &gain).expect("saved");
+    assert_eq!(std::fs::read_to_string(case.path()).expect("there"), expected);
+    let gone = case.folder.path().join("gone/scene.toml");
+    save_text(COMMENTED, &gone, &case.path(), &gain).expect("saved");
+    let text = std::fs::read_to_string(case.path()).expect("there");
+    assert_eq!(text, expected.replace("cube.obj", "gone/cube.obj"));
+    let error = save_text("[[mesh", &gone, &case.path(), &gain).expect_err("no TOML");
+    assert!(error.remedy.is_some() || error.line > 0, "{error}");
+}
+
 #[test]
 fn a_failure_leaves_the_file_alone() {
     let case = Case::new();
