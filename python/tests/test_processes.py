@@ -117,7 +117,10 @@ def test_a_forked_process_is_told_to_be_spawned_and_never_hangs(arguments, expec
     assert run.returncode == 0 and expected in run.stdout, run.stdout + run.stderr
 
 
+# A test that runs in the background inherits that the signal is ignored.
 LOOP = """
+import signal
+signal.signal(signal.SIGINT, signal.default_int_handler)
 import insonify
 scene = insonify.Scene.load("abdomen", {"simulation.paths": 2, "imaging.image_height": 100})
 with insonify.Simulator(scene, tracer="bvh") as simulator:
