@@ -14,6 +14,10 @@ import sys as _sys
 
 from . import _insonify
 
+# Where a process is forked from one that has opened a device, its end waits for no driver.
+if hasattr(_os, "register_at_fork"):
+    _os.register_at_fork(after_in_child=_insonify.forked)
+
 # Mesa's software driver reads them when the first device is opened.
 for _name, _value in _insonify.driver_environment():
     _os.environ[_name] = _os.fspath(_value)

@@ -26,6 +26,14 @@ pub fn enter() -> PyResult<()> {
     }
 }
 
+/// To be called in each process that was forked from this one.
+#[pyfunction]
+pub fn forked() {
+    if is_forked() {
+        insonify::gpu::end_without_drivers();
+    }
+}
+
 /// True in a process that was forked from one that had opened a device.
 pub fn is_forked() -> bool {
     FIRST.get().is_some_and(|first| *first != process::id())

@@ -70,7 +70,9 @@ pub use kernel::Kernel;
 pub use memory::{Buffer, BufferKind, MemoryUse};
 #[cfg(feature = "window")]
 pub use painter::{InterfaceFrame, Painted, Painter, PlacedImage, Screenshot};
-pub use process::{driver_environment, peak_bytes, prepare_process, unreadable_pad};
+pub use process::{
+    driver_environment, end_without_drivers, peak_bytes, prepare_process, unreadable_pad,
+};
 pub use reflect::{BindingInfo, BindingKind};
 pub use timer::FrameTimings;
 pub use tlas::{Tlas, TlasInstance};

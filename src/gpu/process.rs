@@ -71,6 +71,33 @@ pub(super) fn not_interrupted(command: &mut Command) {
     let _ = command;
 }
 
+/// Lets a process that was forked from one with a device end as soon as it exits, without the last deeds of libraries:
+/// drivers then wait for their threads, which are not here (Mesa 25.0 with glibc 2.41 for ever).
+pub fn end_without_drivers() {
+    #[cfg(all(target_os = "linux", target_env = "gnu"))]
+    {
+        use std::ffi::{c_int, c_void};
+        use std::ptr::null_mut;
+
+        // SAFETY: as glibc declares it (stdlib.h).
+        unsafe extern "C" {
+            fn on_exit(deed: extern "C" fn(c_int, *mut c_void), argument: *mut c_void) -> c_int;
+        }
+
+        extern "C" fn end(status: c_int, _: *mut c_void) {
+            // SAFETY: all open streams are written, which needs none of them; then nothing of this process runs any more.
+            unsafe {
+                libc::fflush(null_mut());
+                libc::_exit(status)
+            }
+        }
+
+        // Of all that was registered before, the drivers' deeds among it, this comes first.
+        // SAFETY: the function stays as long as the program, and takes no argument.
+        unsafe { on_exit(end, null_mut()) };
+    }
+}
+
 fn share_heaps() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     {
