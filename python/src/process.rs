@@ -26,7 +26,7 @@ pub fn enter() -> PyResult<()> {
     }
 }
 
-/// To be called in each process that was forked from this one.
+/// Lets this process end without its drivers, if it was forked from one that had opened a device. Called after each fork.
 #[pyfunction]
 pub fn forked() {
     if is_forked() {

@@ -37,7 +37,7 @@ pub fn run(_: &Info) -> Result<()> {
     }
     for fault in driver_faults {
         output::line(format_args!(
-            "a driver could not be loaded: {fault}; install it again, or remove its file from Vulkan's folder icd.d"
+            "{fault}; install it again, or remove its file from Vulkan's folder icd.d"
         ));
     }
     Ok(())

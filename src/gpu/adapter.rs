@@ -83,12 +83,12 @@ pub(crate) struct Adapter {
     pub(crate) portability_subset: bool,
 }
 
-/// What Vulkan finds on a machine.
+/// Devices of a machine, and its faults.
 #[derive(Clone, Debug)]
 pub struct Found {
     /// Every device, usable or not, in the loader's order.
     pub devices: Vec<DeviceInfo>,
-    /// Drivers that the loader could not load, with the cause.
+    /// Sentences about drivers that the loader could not load, each with the cause.
     pub driver_faults: Vec<String>,
 }
 
@@ -188,9 +188,7 @@ pub(crate) fn choose(
                 (adapter.info.kind, instance.driver_faults.first())
             {
                 note_once(&FAULT, || {
-                    format!(
-                        "warning: images are made on the processor: a driver could not be loaded: {fault}; install it again"
-                    )
+                    format!("warning: images are made on the processor: {fault}; install it again")
                 });
             }
             match plan(&adapter) {

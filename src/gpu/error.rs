@@ -189,8 +189,6 @@ pub(crate) fn during(what: impl Into<String>) -> impl FnOnce(vk::Result) -> GpuE
 impl GpuError {
     /// No device at all, on a machine whose drivers have these faults.
     pub(crate) fn no_device(driver_faults: &[String]) -> Self {
-        let faults =
-            driver_faults.iter().map(|fault| format!("; a driver could not be loaded: {fault}"));
-        Self::NoDevice { seen: faults.collect() }
+        Self::NoDevice { seen: driver_faults.iter().map(|fault| format!("; {fault}")).collect() }
     }
 }

@@ -77,9 +77,9 @@ pub(crate) struct Instance {
     pub(crate) validating: bool,
     pub(crate) log: ValidationLog,
     messenger: Option<Messenger>,
-    /// What the loader said of drivers of the machine that it could not load.
+    /// Sentences about drivers of the machine that the loader could not load.
     pub(crate) driver_faults: Vec<String>,
-    /// Where the loader writes that, also while the instance is destroyed.
+    /// The log into which the loader writes that, also while the instance is destroyed.
     _told: ValidationLog,
     /// Holds the loader's library open; dropped last.
     pub(crate) entry: ash::Entry,
@@ -290,16 +290,19 @@ fn validation_extensions(entry: &ash::Entry) -> Result<Vec<std::ffi::CString>, G
     Ok(extensions)
 }
 
-/// What the loader's errors say of drivers: each once, without its own prefixes.
+/// Sentences about drivers that the loader could not load, from its errors: each once, without its own prefixes.
 fn driver_faults(messages: &[String]) -> Vec<String> {
     let mut out: Vec<String> = Vec::new();
     for message in messages {
         let text = message.splitn(3, ": ").last().unwrap_or_default();
         // The line after the cause names only the file that is passed over.
-        if text.is_empty() || text.starts_with("loader_") || out.iter().any(|known| known == text) {
+        if text.is_empty() || text.starts_with("loader_") {
             continue;
         }
-        out.push(text.to_owned());
+        let fault = format!("a driver could not be loaded: {text}");
+        if !out.contains(&fault) {
+            out.push(fault);
+        }
     }
     out
 }

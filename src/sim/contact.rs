@@ -15,9 +15,9 @@ use crate::scene::Scene;
 pub use hand::{Body, Hand, PRESS, Spot};
 pub use skin::{Skin, Skins};
 
-/// What is wrong where no part of the face is coupled, in words for the user.
+/// Message for the user where no part of the face is coupled.
 pub const UNTOUCHED: &str = "no part of the probe's face touches the skin: images are black";
-/// What to do about it.
+/// Remedy for that.
 pub const REACH_SKIN: &str = "move the probe to the skin (probe.pose), allow for more gel (contact.gel), or leave [contact] out";
 
 /// Points of the face in a row, at least; a whole number of them belongs to each scanline.

@@ -140,7 +140,7 @@ impl Console {
     }
 }
 
-/// What stands in sections that would name what is to be found.
+/// Text of sections that would name what is to be found.
 const EXAMINED: &str = "Hidden while a task of an examination is under way.";
 
 fn section(ui: &mut Ui, name: &str, open: bool, add: impl FnOnce(&mut Ui)) {

@@ -28,7 +28,7 @@ pub struct Session<'a> {
     pub simulator: Simulator,
     /// The scene in its present state.
     pub scene: Scene,
-    /// What clients may open.
+    /// Scenes that clients may open.
     reach: Reach,
     path: PathBuf,
     file: SceneFile,

@@ -25,6 +25,11 @@ pub struct Run<'p> {
     pub resume: bool,
 }
 
+/// Number of samples in these parts.
+fn count(parts: &[Part]) -> u32 {
+    parts.iter().map(|part| part.samples.len() as u32).sum()
+}
+
 impl Run<'_> {
     /// The parts of the shard; none where there are more shards than parts.
     pub fn parts(&self) -> Vec<Part> {
@@ -34,7 +39,7 @@ impl Run<'_> {
 
     /// Number of samples of the shard.
     pub fn samples(&self) -> u32 {
-        self.parts().iter().map(|part| part.samples.len() as u32).sum()
+        count(&self.parts())
     }
 
     /// Checks what the shard's samples draw, without making one: of more than [`MOST_CHECKED`] so many, evenly among them.
@@ -43,7 +48,8 @@ impl Run<'_> {
     /// # Errors
     /// The first draw that does not fit, with its place in the plan.
     pub fn check(&self) -> Result<u32, DatasetError> {
-        let (parts, all) = (self.parts(), self.samples());
+        let parts = self.parts();
+        let all = count(&parts);
         let step = all.div_ceil(MOST_CHECKED).max(1) as usize;
         let numbers = parts.iter().flat_map(|part| part.samples.clone()).step_by(step);
         self.plan.check(numbers)?;

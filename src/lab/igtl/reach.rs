@@ -1,4 +1,4 @@
-//! What clients may read of the machine: scenes in the folder of the one that was opened, and those that ship.
+//! Limits of what clients may read of the machine: scenes in the folder of the one that was opened, and those that ship.
 
 use std::path::{Component, Path, PathBuf};
 

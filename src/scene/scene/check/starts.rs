@@ -49,10 +49,8 @@ impl Scene {
     /// within [`SHOWN`]: bone.
     pub(in crate::scene) fn lines_in_bone(&self, file: &Path) -> Option<Issue> {
         let takes = |tissue: usize| {
-            let tissue = &self.tissues[tissue];
-            let one_way =
-                tissue.attenuation / 10.0 * self.probe.frequency.powf(tissue.attenuation_exponent);
-            2.0 * one_way * SHOWN
+            let nepers = 2.0 * SHOWN * self.tissues[tissue].absorption(self.probe.frequency);
+            nepers * 10.0 / std::f64::consts::LN_10
         };
         let dark = |tissue: usize| takes(tissue) > self.imaging.dynamic_range;
         let shown = || self.instances.iter().filter(|i| i.shown);
