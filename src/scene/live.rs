@@ -58,7 +58,7 @@ impl fmt::Display for Grade {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.level {
             0 => f.write_str("full quality"),
-            level => write!(f, "live quality {level}/{}", self.levels - 1),
+            level => write!(f, "coarse {level}/{}", self.levels - 1),
         }
     }
 }

@@ -66,8 +66,9 @@ const BINDINGS: &[(&str, &[Binding], &str)] = &[
     ),
     (
         "Up Down",
-        &moves(Key::ArrowDown, Key::ArrowUp, Axis::Elevation),
-        "slide across the image (2 mm)",
+        // Away from whoever sees the image in front of him, as the guide says it.
+        &moves(Key::ArrowUp, Key::ArrowDown, Axis::Elevation),
+        "slide into the image, away from you, and out of it (2 mm)",
     ),
     ("Page Up Page Down", &moves(Key::PageUp, Key::PageDown, Axis::Depth), "lift and press (2 mm)"),
     ("A D", &moves(Key::A, Key::D, Axis::Rock), "rock in the image plane (2 deg)"),

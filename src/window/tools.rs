@@ -129,8 +129,8 @@ impl Tools {
         let step = steps * frame.sector.pitch * if fine { 0.25 } else { 1.0 };
         match axis {
             Axis::Lateral => sheet.nudge(DVec2::X * step),
-            // Up is the key of this axis, and depth grows downwards.
-            Axis::Elevation => sheet.nudge(-DVec2::Y * step),
+            // Its keys are Up and Down, and depth grows downwards.
+            Axis::Elevation => sheet.nudge(DVec2::Y * step),
             _ => false,
         }
     }

@@ -85,7 +85,9 @@ impl Step {
         match (self.act, self.amount >= 0.0) {
             (Act::Along | Act::Rock, true) => "\u{27a1}",
             (Act::Along | Act::Rock, false) => "\u{2b05}",
-            (Act::Across | Act::Tilt, _) => "\u{2195}",
+            // Into the image, where the beam's far end goes in a tilt, and out of it.
+            (Act::Across, false) | (Act::Tilt, true) => "\u{2197}",
+            (Act::Across, true) | (Act::Tilt, false) => "\u{2199}",
             (Act::Press, true) => "\u{2b07}",
             (Act::Press, false) => "\u{2b06}",
             (Act::Rotate, true) => "\u{21bb}",

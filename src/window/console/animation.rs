@@ -7,6 +7,7 @@ use egui::{DragValue, Label, Slider, Ui};
 use super::controls::words;
 use crate::model::{Model, Placed};
 use crate::scene::Strategy;
+use crate::settings::units::DURATION;
 use crate::sim::Tracer;
 use crate::style::button;
 
@@ -23,6 +24,7 @@ pub(super) fn show(ui: &mut Ui, model: &mut Model, now: Instant) {
         }
         let mut seconds = model.clock.at(now);
         let time = DragValue::new(&mut seconds).speed(0.02).fixed_decimals(2).suffix(" s");
+        let time = time.custom_parser(|text| DURATION.finite(text).ok());
         if ui.add(time).on_hover_text("The scene's time: drag or type").changed() {
             model.clock.seek(seconds, now);
             model.touch(now);

@@ -110,9 +110,21 @@ fn slider(ui: &mut Ui, path: &str, facts: &Facts, value: &mut f64) {
     let beyond = facts.unit().len().saturating_sub(5) as f32;
     ui.spacing_mut().slider_width -= 12.0 * beyond;
     let slider = over(facts, value).max_decimals(4).suffix(format!(" {}", facts.unit()));
-    explained(ui.add(slider), path, facts);
+    explained(ui.add(slider.custom_parser(|text| typed(facts, text))), path, facts);
     let [least, most] = facts.range;
     *value = value.clamp(least, most);
+}
+
+/// The number that is typed into the field of a setting, in the unit that the field shows: alone, with that unit, or with
+/// another one of its measure ("14.5 cm"). While a unit is half typed, none.
+pub(super) fn typed(facts: &Facts, text: &str) -> Option<f64> {
+    let counted = || number(text.trim().strip_suffix(facts.unit())?);
+    number(text).or_else(counted).or_else(|| facts.measure()?.parse(text).ok())
+}
+
+/// A plain number as it is typed; the sign may be a true minus, as the fields show it.
+fn number(text: &str) -> Option<f64> {
+    text.trim().replace('\u{2212}', "-").parse().ok()
 }
 
 /// The slider of a setting, logarithmic where its usual values span decades.
@@ -127,7 +139,11 @@ fn angle(ui: &mut Ui, path: &str, facts: &Facts, radians: &mut f64) {
     let [low, high] = facts.usual.map(f64::to_degrees);
     let mut degrees = radians.to_degrees();
     let slider = Slider::new(&mut degrees, low..=high).max_decimals(1).suffix(" deg");
-    if explained(ui.add(slider), path, facts).changed() {
+    // A plain number is what stands there: degrees.
+    let degrees_of = |text: &str| {
+        number(text).or_else(|| facts.measure()?.parse(text).ok().map(f64::to_degrees))
+    };
+    if explained(ui.add(slider.custom_parser(degrees_of)), path, facts).changed() {
         *radians = degrees.to_radians();
     }
 }
@@ -139,7 +155,8 @@ fn count(ui: &mut Ui, path: &str, facts: &Facts, value: &mut u32) {
         "" => String::new(),
         unit => format!(" {unit}"),
     };
-    explained(ui.add(over(facts, &mut number).integer().suffix(suffix)), path, facts);
+    let slider = over(facts, &mut number).integer().suffix(suffix);
+    explained(ui.add(slider.custom_parser(|text| typed(facts, text))), path, facts);
     *value = number.clamp(facts.range[0], facts.range[1]) as u32;
 }
 
@@ -159,7 +176,8 @@ fn number_or_off(ui: &mut Ui, path: &str, facts: &Facts, value: &mut Value) {
         let drag = DragValue::new(number)
             .speed((high - low) / 200.0)
             .max_decimals(3)
-            .suffix(format!(" {}", facts.unit()));
+            .suffix(format!(" {}", facts.unit()))
+            .custom_parser(|text| typed(facts, text));
         explained(ui.add(drag), path, facts);
         *number = number.clamp(facts.range[0], facts.range[1]);
     }
@@ -190,4 +208,34 @@ pub(super) fn words<W: Words>(
         }
     });
     list.response
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::{Imaging, Probe};
+
+    #[test]
+    fn numbers_are_typed_with_the_unit_that_is_shown_another_one_or_none() {
+        let facts = |key: &str| {
+            let probe = Probe::rows().iter().map(|row| &row.facts);
+            let all = probe.chain(Imaging::rows().iter().map(|row| &row.facts));
+            all.into_iter().find(|facts| facts.key == key).expect(key)
+        };
+        for (key, text, expected) in [
+            ("depth", "145", Some(145.0)),
+            ("depth", "145 mm", Some(145.0)),
+            ("depth", "14.5cm", Some(145.0)),
+            ("depth", "14.5 c", None),
+            ("depth", "14.5 MHz", None),
+            ("frequency", " 4 MHz", Some(4.0)),
+            ("frequency", "4000 kHz", Some(4.0)),
+            ("gain", "\u{2212}12 dB", Some(-12.0)),
+            ("gain", "-inf", Some(f64::NEG_INFINITY)),
+            ("scanlines", "96", Some(96.0)),
+            ("depth", "", None),
+        ] {
+            assert_eq!(typed(facts(key), text), expected, "{key} {text}");
+        }
+    }
 }

@@ -2,7 +2,7 @@
 
 use egui::{Slider, SliderClamping, Ui};
 
-use super::controls::{explained, group_with};
+use super::controls::{explained, group_with, typed};
 use crate::model::Settings;
 use crate::settings::{Group, Imaging};
 use crate::style::button;
@@ -21,7 +21,8 @@ pub(super) fn show(ui: &mut Ui, settings: &mut Settings) {
             let slider = Slider::new(level, low..=high)
                 .clamping(SliderClamping::Never)
                 .max_decimals(1)
-                .suffix(" dB");
+                .suffix(" dB")
+                .custom_parser(|text| typed(facts, text));
             explained(ui.add(slider), Imaging::TABLE, facts);
             *level = level.clamp(facts.range[0], facts.range[1]);
             ui.end_row();

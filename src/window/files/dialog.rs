@@ -3,6 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use egui::text::{CCursor, CCursorRange};
+use egui::text_edit::TextEditState;
 use egui::{Button, Key, RichText, ScrollArea, TextEdit, Ui};
 
 use super::{Files, Purpose, said};
@@ -31,6 +33,8 @@ pub(crate) struct Dialog {
     recent: Vec<PathBuf>,
     /// Whether the file at `path` is to be replaced has been asked.
     replaces: bool,
+    /// True until it is drawn for the first time.
+    fresh: bool,
 }
 
 impl Dialog {
@@ -44,6 +48,7 @@ impl Dialog {
             listed: Vec::new(),
             recent: recent::before(path),
             replaces: false,
+            fresh: true,
         }
     }
 
@@ -144,6 +149,13 @@ fn contents(
     let field = ui.add(field).on_hover_text("Scene file (.toml)");
     if field.changed() {
         dialog.edited();
+    }
+    // What is typed first takes the place of the path that was filled in.
+    if std::mem::take(&mut dialog.fresh) {
+        let mut state = TextEditState::load(ui.ctx(), field.id).unwrap_or_default();
+        let end = CCursor::new(dialog.path.chars().count());
+        state.cursor.set_char_range(Some(CCursorRange::two(CCursor::default(), end)));
+        state.store(ui.ctx(), field.id);
     }
     let confirmed = field.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
     if dialog.purpose == Purpose::Load {

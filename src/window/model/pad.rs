@@ -134,7 +134,8 @@ impl Pad {
             let [mm, rad] = SPEED.map(|s| s * factor);
             match axis {
                 Axis::Lateral => mm * shaped(self.left[0]),
-                Axis::Elevation => mm * shaped(self.left[1]),
+                // As the keys: forwards is into the image.
+                Axis::Elevation => -mm * shaped(self.left[1]),
                 Axis::Depth => mm * (press - lift),
                 Axis::Rotate => rad * rotate,
                 Axis::Rock => rad * rock,
@@ -177,7 +178,7 @@ mod tests {
         for (controls, axis, full) in [
             (vec![stick(Stick::LeftStickX, 1.0)], Axis::Lateral, mm),
             (vec![stick(Stick::LeftStickX, -1.0)], Axis::Lateral, -mm),
-            (vec![stick(Stick::LeftStickY, 1.0)], Axis::Elevation, mm),
+            (vec![stick(Stick::LeftStickY, 1.0)], Axis::Elevation, -mm),
             (vec![stick(Stick::RightStickX, 1.0)], Axis::Rotate, rad),
             (vec![rock, stick(Stick::RightStickX, 1.0)], Axis::Rock, rad),
             (vec![stick(Stick::RightStickY, -1.0)], Axis::Tilt, -rad),
@@ -217,9 +218,9 @@ mod tests {
         let mut pad = Pad::default();
         pad.set(Control::Stick(Stick::LeftStickY, 1.0));
         pad.set(Control::Button(Button::RightTrigger, 1.0));
-        assert_eq!(speed(&pad, Axis::Elevation), SPEED[0] / 4.0);
+        assert_eq!(speed(&pad, Axis::Elevation), -SPEED[0] / 4.0);
         pad.set(Control::Button(Button::RightTrigger, 0.0));
-        assert_eq!(speed(&pad, Axis::Elevation), SPEED[0]);
+        assert_eq!(speed(&pad, Axis::Elevation), -SPEED[0]);
     }
 
     #[test]

@@ -158,6 +158,45 @@ mod tests {
         assert_eq!(run(passes(input(events))), ("cd".to_owned(), 1));
     }
 
+    // `145 mm` and Enter became 14 mm.
+    #[test]
+    fn a_number_that_is_typed_with_enter_between_two_pictures_is_taken_whole() {
+        let key = |key| Event::Key {
+            key,
+            physical_key: None,
+            pressed: true,
+            repeat: false,
+            modifiers: Modifiers::NONE,
+        };
+        let typed = |text: &str| -> Vec<Event> {
+            text.chars().map(|letter| Event::Text(letter.to_string())).collect()
+        };
+        let click = vec![moved(30.0), button(30.0, true), button(30.0, false)];
+        let enter = vec![key(Key::Enter)];
+        let all = |events: &[Vec<Event>]| passes(input(events.concat()));
+        for (what, inputs) in [
+            ("at once", all(&[click.clone(), typed("145 mm"), enter.clone()])),
+            (
+                "in two",
+                [all(&[click.clone(), typed("14")]), all(&[typed("5 mm"), enter.clone()])].concat(),
+            ),
+            ("after the click", [all(&[click]), all(&[typed("145 mm"), enter])].concat()),
+        ] {
+            let (context, mut value) = (Context::default(), 90.0_f64);
+            for input in [vec![input(Vec::new()); 2], inputs, vec![input(Vec::new()); 2]].concat() {
+                let mut output = context.run_ui(input, |ui| {
+                    let rect = Rect::from_min_size(pos2(20.0, 40.0), Vec2::new(200.0, 20.0));
+                    let drag = egui::DragValue::new(&mut value).suffix(" mm");
+                    let read = |text: &str| crate::settings::units::LENGTH.finite(text).ok();
+                    ui.put(rect, drag.custom_parser(read));
+                    value = value.clamp(10.0, 300.0);
+                });
+                output.textures_delta.clear();
+            }
+            assert_eq!(value, 145.0, "{what}");
+        }
+    }
+
     #[test]
     fn events_of_one_kind_stay_together_and_in_order() {
         let events = vec![Event::Copy, moved(1.0), Event::Cut, moved(2.0)];
