@@ -66,7 +66,7 @@ def driver_environment() -> list[tuple[str, str]]:
     """Variables that make Mesa's software driver compile in a third of the time; import sets them."""
 
 def forked() -> None:
-    """Lets this process end without its drivers, if it was forked from one with a device; called after each fork."""
+    """Lets this process end without its drivers, if it was forked from one that had opened a device. Called after each fork."""
 
 def set_compiler(program: str, arguments: list[str]) -> None:
     """Names a program that compiles kernels in a process of its own, by compile_standard_input; import does."""

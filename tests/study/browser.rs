@@ -153,9 +153,14 @@ impl Browser {
 
     /// Waits until a script returns true.
     pub fn wait(&self, script: &str) {
+        self.until(script, || self.run(script) == json!(true));
+    }
+
+    /// Waits until something is so.
+    pub fn until(&self, what: &str, is_so: impl Fn() -> bool) {
         let begun = Instant::now();
-        while self.run(script) != json!(true) {
-            assert!(begun.elapsed() < PATIENCE, "never: {script}");
+        while !is_so() {
+            assert!(begun.elapsed() < PATIENCE, "never: {what}");
             std::thread::sleep(Duration::from_millis(20));
         }
     }

@@ -139,10 +139,12 @@ fn an_assessor_fills_the_form() {
         browser.click(&format!("input[name='image-{case}'][value='{image}']"));
         browser.click(&format!("input[name='agreement-{case}'][value='{degree}']"));
     }
-    // The answers outlive the page.
-    browser.open(&page);
-    browser.wait(LOADED);
-    assert!(notice(&browser).contains("here again"), "{}", notice(&browser));
+    // The answers outlive the page. A browser takes its time to tell its next process what a page has stored.
+    browser.until("the answers are here again", || {
+        browser.open(&page);
+        browser.wait(LOADED);
+        notice(&browser).contains("here again")
+    });
     for (number, group) in (1..).zip(&groups) {
         go(&browser, &format!("ranking-{number}"));
         let [first, second] = [0, 1].map(|i| format!("#rank-{number}-{}", group[i]));
