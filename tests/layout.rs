@@ -7,6 +7,7 @@ use insonify::sim::layout::{
     Aperture, CONSTANTS, Counters, Frame, Fusion, Instance, Interaction, Label, Row, Scanline,
     Segment, Surface, Tissue, View3d,
 };
+use insonify::sim::push;
 use insonify::sim::shaders::{Library, words_of};
 use spirq::ReflectConfig;
 use spirq::ty::{StructType, Type};
@@ -217,4 +218,49 @@ fn the_kernels_use_the_same_layout() {
             );
         }
     }
+}
+
+/// Names, offsets and sizes of the push constants that a kernel's source declares, by the rules of std430.
+fn declared(kernel: &str, source: &str) -> Vec<(String, usize, usize)> {
+    let (_, rest) = source.split_once("layout(push_constant) uniform Push {").expect(kernel);
+    let code = rest.split_once('}').expect("its end").0.lines();
+    let code: String = code.map(|line| line.split("//").next().unwrap()).collect();
+    let mut end = 0;
+    let declaration = |text: &str| {
+        let (ty, name) = text.trim().split_once(' ')?;
+        let size = match ty {
+            "uint" | "float" => 4,
+            "uvec4" | "vec4" => 16,
+            _ => panic!("{kernel}: {ty}"),
+        };
+        let offset = usize::next_multiple_of(end, size);
+        end = offset + size;
+        Some((name.trim().to_owned(), offset, size))
+    };
+    code.split(';').filter_map(declaration).collect()
+}
+
+#[test]
+fn push_constants_are_those_of_the_sources() {
+    let glsl = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/glsl"));
+    let mut kernels = Vec::new();
+    for entry in std::fs::read_dir(glsl).unwrap() {
+        let path = entry.unwrap().path();
+        let source = std::fs::read_to_string(&path).unwrap();
+        if !source.contains("layout(push_constant)") {
+            continue;
+        }
+        let kernel = path.file_stem().unwrap().to_str().unwrap().to_owned();
+        let (_, ours) = push::ALL
+            .iter()
+            .find(|(name, _)| *name == kernel)
+            .unwrap_or_else(|| panic!("{kernel}"));
+        let ours: Vec<_> = ours.iter().map(|(n, o, s)| ((*n).to_owned(), *o, *s)).collect();
+        assert_eq!(declared(&kernel, &source), ours, "{kernel}");
+        kernels.push(kernel);
+    }
+    assert_eq!(kernels.len(), push::ALL.len(), "{kernels:?}");
+    let planted = "layout(push_constant) uniform Push { uint b; uint a;  // first\n uvec4 c; };";
+    let found = [("b", 0, 4), ("a", 4, 4), ("c", 16, 16)].map(|(n, o, s)| (n.to_owned(), o, s));
+    assert_eq!(declared("planted", planted), found);
 }

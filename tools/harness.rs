@@ -46,7 +46,6 @@ pub use insonify::output::npy::Element;
 use insonify::sim::pass::{self, Pass};
 use insonify::sim::rounds::Round;
 use insonify::sim::shaders::Library;
-use insonify::sim::stages;
 pub use run::run;
 
 /// The kinds of inputs.
@@ -166,19 +165,18 @@ impl Job {
     /// The job of a stage, from the inputs that it reads; its other bindings get the size that the frame needs.
     pub fn of(pass: &Pass, given: Vec<Input>, push: Vec<u8>) -> Self {
         let mut job = Self { inputs: given, push };
-        job.inputs.retain(|input| pass.binds.contains(&input.name));
-        for name in pass.binds {
-            if job.inputs.iter().all(|input| input.name != *name) {
-                let array = stages::array(name).expect("an array of the frame");
+        let binds = |input: &Input| pass.binds.iter().position(|array| array.name == input.name);
+        job.inputs.retain(|input| binds(input).is_some());
+        for array in pass.binds {
+            if job.inputs.iter().all(|input| input.name != array.name) {
                 let role = if array.zeroed { Role::Sum } else { Role::Write };
                 let mut input =
                     Input { name: array.name, role, element: array.element, bytes: Vec::new() };
-                input.begin(sizes::of_frame(&job, name) / 4);
+                input.begin(sizes::of_frame(&job, array.name) / 4);
                 job.inputs.push(input);
             }
         }
-        let place = |input: &Input| pass.binds.iter().position(|name| *name == input.name);
-        job.inputs.sort_by_key(place);
+        job.inputs.sort_by_key(binds);
         job
     }
 
@@ -223,7 +221,7 @@ impl Job {
 }
 
 /// Extent of a dispatch.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Extent {
     /// One dispatch.
     Once(pass::Extent),

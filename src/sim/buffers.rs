@@ -5,10 +5,8 @@ use std::ops::Index;
 use std::sync::Arc;
 
 use super::pass::{Array, Sizes};
+use super::tables;
 use crate::gpu::{Buffer, BufferKind, Commands, Device, GpuError};
-
-/// Tables that all images of a frame share.
-const SHARED: [&str; 6] = ["scanlines", "rows", "surfaces", "points", "grey", "speckle"];
 
 /// All buffers of the frame but the geometry; made when a frame of the scene first needs them.
 pub(super) struct Buffers {
@@ -35,7 +33,7 @@ impl Buffers {
         device: &Arc<Device>,
         arrays: impl Iterator<Item = &'static Array>,
     ) -> Result<Self, GpuError> {
-        let shared = SHARED.iter().filter_map(|name| self.made.get_key_value(name));
+        let shared = tables::ARRAYS.iter().filter_map(|array| self.made.get_key_value(array.name));
         let made = shared.map(|(name, (array, buffer))| (*name, (*array, buffer.clone())));
         let mut buffers = Self { made: made.collect(), room: self.room };
         buffers.add(device, arrays)?;
@@ -45,7 +43,7 @@ impl Buffers {
     /// Bytes of the buffers that no other lane shares.
     pub(super) fn own_bytes(&self) -> u64 {
         let own = |(array, _): &&(&Array, Buffer)| {
-            array.within.is_none() && !SHARED.contains(&array.name)
+            array.within.is_none() && !tables::ARRAYS.iter().any(|shared| shared.name == array.name)
         };
         self.made.values().filter(own).map(|(_, buffer)| buffer.size()).sum()
     }
@@ -56,23 +54,25 @@ impl Buffers {
         device: &Arc<Device>,
         arrays: impl Iterator<Item = &'static Array>,
     ) -> Result<(), GpuError> {
-        let missing: Vec<_> = arrays.filter(|array| !self.has(array.name)).collect();
+        let missing: Vec<_> = arrays.filter(|array| !self.has(array)).collect();
         let within = |array: &&&Array| array.within.is_some();
         for array in missing.iter().filter(|array| !within(array)) {
-            let guests = missing.iter().filter(|guest| guest.within == Some(array.name));
+            let guests = missing
+                .iter()
+                .filter(|guest| guest.within.is_some_and(|host| host.name == array.name));
             let bytes = guests.chain([array]).map(|a| a.bytes(&self.room)).max().unwrap_or(0);
             let buffer = device.buffer(array.name, bytes.max(16), BufferKind::Storage)?;
             self.made.insert(array.name, (array, buffer));
         }
         for guest in missing.iter().filter(within) {
-            let host = self[guest.within.unwrap_or_default()].clone();
+            let host = self[guest.within.expect("a guest")].clone();
             self.made.insert(guest.name, (guest, host));
         }
         Ok(())
     }
 
-    pub(super) fn has(&self, name: &str) -> bool {
-        self.made.contains_key(name)
+    pub(super) fn has(&self, array: &Array) -> bool {
+        self.made.contains_key(array.name)
     }
 
     /// True if all have room for frames of `sizes`.
@@ -97,17 +97,17 @@ impl Buffers {
         }
     }
 
-    /// Bytes of buffer `name` that a frame of these `sizes` uses.
-    pub(super) fn bytes(&self, name: &str, sizes: &Sizes) -> usize {
-        self.made[name].0.bytes(sizes) as usize
+    /// Bytes of an array that a frame of these `sizes` uses.
+    pub(super) fn bytes(&self, array: &Array, sizes: &Sizes) -> usize {
+        self.made[array.name].0.bytes(sizes) as usize
     }
 }
 
-impl Index<&str> for Buffers {
+impl Index<&Array> for Buffers {
     type Output = Buffer;
 
-    fn index(&self, name: &str) -> &Buffer {
-        let made = self.made.get(name);
-        &made.unwrap_or_else(|| panic!("no stage of this scene makes '{name}'")).1
+    fn index(&self, array: &Array) -> &Buffer {
+        let made = self.made.get(array.name);
+        &made.unwrap_or_else(|| panic!("no stage of this scene makes '{}'", array.name)).1
     }
 }

@@ -3,6 +3,7 @@
 use super::layout::{self, ROLE_BRANCHES};
 use super::pass::Extent;
 use super::passes::{Instead, Passes};
+use super::stages::trace;
 use super::stages::{APERTURE, EXPECT, ORIGIN, SCATTER, TRACE, aperture, scatter};
 use crate::gpu::{Commands, GpuError, Stage};
 
@@ -47,7 +48,7 @@ impl Passes {
     fn trace(&self, cmd: &mut Commands, path_begin: u32, turn: &mut u32) -> Result<(), GpuError> {
         if path_begin > 0 {
             cmd.barrier(Stage::Compute, Stage::Transfer);
-            self.active().iter().for_each(|lane| cmd.fill(&lane.buffers["segment_count"], 0));
+            self.active().iter().for_each(|lane| cmd.fill(&lane.buffers[&trace::SEGMENT_COUNT], 0));
             cmd.barrier(Stage::Transfer, Stage::Compute);
         }
         let path_end = self.frame().paths.min(path_begin + self.batches.paths);
@@ -61,7 +62,7 @@ impl Passes {
                 converges = false;
             }
             let threads = Extent::Threads(round.threads());
-            let push = bytemuck::cast_slice(&round.push);
+            let push = bytemuck::bytes_of(&round.push);
             self.record(cmd, &TRACE[round.role as usize], threads, push, &|_| Vec::new())?;
         }
         Ok(())

@@ -3,9 +3,10 @@
 
 use super::lane::Lane;
 use super::layout::Frame;
-use super::pass::Extent;
+use super::pass::{Array, Extent};
 use super::passes::Passes;
 use super::stages::{AXIAL, BEAM, TRACE};
+use super::stages::{axial, beam, expect, inputs, scatter, trace};
 use crate::gpu::{Buffer, Commands, GpuError, Stage};
 
 /// A number of segments that leaves no room for another, and enough for all of them to be counted.
@@ -19,17 +20,17 @@ impl Passes {
         let direct = |frame: &Frame| Frame { max_reflections: 0, noise: 0.0, ..*frame };
         for lane in self.active() {
             let constants = direct(&lane.frame);
-            cmd.write(&lane.buffers["direct_frame"], 0, bytemuck::bytes_of(&constants))?;
+            cmd.write(&lane.buffers[&expect::DIRECT_FRAME], 0, bytemuck::bytes_of(&constants))?;
             // Segments are not wanted: those of the frame stay.
-            cmd.fill(&lane.buffers["direct_count"], FULL);
+            cmd.fill(&lane.buffers[&expect::DIRECT_COUNT], FULL);
         }
         cmd.barrier(Stage::Transfer, Stage::Compute);
         cmd.scope("expect");
         let instead = [
-            ("frame", "direct_frame"),
-            ("surface_echoes", "direct_echoes"),
-            ("segment_count", "direct_count"),
-            ("counters", "direct_counters"),
+            (&inputs::FRAME, &expect::DIRECT_FRAME),
+            (&trace::SURFACE_ECHOES, &expect::DIRECT_ECHOES),
+            (&trace::SEGMENT_COUNT, &expect::DIRECT_COUNT),
+            (&inputs::COUNTERS, &expect::DIRECT_COUNTERS),
         ];
         let direct = direct(self.frame());
         let mut turn = 0;
@@ -37,9 +38,9 @@ impl Passes {
             let paths = begin..direct.paths.min(begin + self.batches.paths);
             for round in self.batches.rounds.of(&direct, paths, &mut turn) {
                 let threads = Extent::Threads(round.threads());
-                let push = bytemuck::cast_slice(&round.push);
+                let push = bytemuck::bytes_of(&round.push);
                 let pass = &TRACE[round.role as usize];
-                self.record(cmd, pass, threads, push, &|lane| named(lane, &instead))?;
+                self.record(cmd, pass, threads, push, &|lane| in_place(lane, &instead))?;
             }
         }
         Ok(())
@@ -48,28 +49,34 @@ impl Passes {
     /// Records the samples of IQ that surface echoes alone make: all of them, and the direct ones.
     pub(super) fn surface_samples(&self, cmd: &mut Commands) -> Result<(), GpuError> {
         cmd.scope("level");
-        for (echoes, iq) in [("surface_echoes", "surface_iq"), ("direct_echoes", "direct_iq")] {
+        for (echoes, iq) in [
+            (&trace::SURFACE_ECHOES, &expect::SURFACE_IQ),
+            (&expect::DIRECT_ECHOES, &expect::DIRECT_IQ),
+        ] {
             let instead = [
-                ("frame", "direct_frame"),
-                ("surface_echoes", echoes),
-                ("volume_echoes", "no_echoes"),
-                ("point_echoes", "no_echoes"),
-                ("counters", "direct_counters"),
-                ("lateral", "label_lateral"),
-                ("iq", iq),
-                ("log_image", "label_log_image"),
+                (&inputs::FRAME, &expect::DIRECT_FRAME),
+                (&trace::SURFACE_ECHOES, echoes),
+                (&scatter::VOLUME_ECHOES, &expect::NO_ECHOES),
+                (&scatter::POINT_ECHOES, &expect::NO_ECHOES),
+                (&inputs::COUNTERS, &expect::DIRECT_COUNTERS),
+                (&beam::LATERAL, &expect::LABEL_LATERAL),
+                (&axial::IQ, iq),
+                (&axial::LOG_IMAGE, &expect::LABEL_LOG_IMAGE),
             ];
             for pass in [&BEAM, &AXIAL] {
                 let extent = pass.extent.expect("a stage of every frame states its extent");
                 let threads = extent(self.frame());
-                self.record(cmd, pass, threads, &[], &|lane| named(lane, &instead))?;
+                self.record(cmd, pass, threads, &[], &|lane| in_place(lane, &instead))?;
             }
         }
         Ok(())
     }
 }
 
-/// Names with the buffers of a lane that have the names beside them.
-fn named<'l>(lane: &'l Lane, pairs: &[(&'static str, &str)]) -> Vec<(&'static str, &'l Buffer)> {
-    pairs.iter().map(|&(name, other)| (name, &lane.buffers[other])).collect()
+/// Arrays, each with the buffer that a lane has of the array beside it.
+fn in_place<'l>(
+    lane: &'l Lane,
+    pairs: &[(&'static Array, &Array)],
+) -> Vec<(&'static Array, &'l Buffer)> {
+    pairs.iter().map(|&(array, other)| (array, &lane.buffers[other])).collect()
 }

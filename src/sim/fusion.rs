@@ -4,6 +4,7 @@
 use std::sync::Arc;
 
 use super::buffers::Buffers;
+use super::stages::mask;
 use super::{layout, placement};
 use crate::gpu::{Commands, Device, GpuError, Image};
 use crate::scene::{Acquired, Fusion, Scene};
@@ -107,7 +108,7 @@ impl FusionResources {
             return Ok(());
         };
         let constants = self.constants(acquired, fusion);
-        cmd.write(&buffers["fusion"], 0, bytemuck::bytes_of(&constants))?;
+        cmd.write(&buffers[&mask::FUSION], 0, bytemuck::bytes_of(&constants))?;
         self.now = acquired.now;
         self.shaded = fusion.background_shadows;
         self.bands = is_banded(scene).then(|| fusion.levels());

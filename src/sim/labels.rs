@@ -4,6 +4,7 @@
 use serde_json::{Value, json};
 
 use super::layout::{Frame, Label, NONE};
+use super::stages::{chart, label};
 use super::{SimError, Simulator};
 use crate::scene::{Scene, palette};
 
@@ -209,14 +210,14 @@ impl Simulator {
         }
         let frame = *self.constants();
         let levelled = self.last.levelled;
-        let mut grid = |name, rows: u32, columns: u32| {
-            let labels = bytemuck::pod_collect_to_vec(&self.read_again(name)?);
+        let mut grid = |array, rows: u32, columns: u32| {
+            let labels = bytemuck::pod_collect_to_vec(&self.read_again(array)?);
             let shape = [rows, columns].map(|n| n as usize);
             Ok::<_, SimError>(LabelGrid { shape, labels, levelled })
         };
         Ok(Some(Labels {
-            samples: grid("labels", frame.scanlines, frame.samples)?,
-            pixels: grid("pixel_labels", frame.image_height, frame.image_width)?,
+            samples: grid(&label::LABELS, frame.scanlines, frame.samples)?,
+            pixels: grid(&chart::PIXEL_LABELS, frame.image_height, frame.image_width)?,
         }))
     }
 }

@@ -13,6 +13,11 @@ use super::fusion::{FusionResources, Pyramid};
 use super::layout::{self, Frame};
 use super::pass::{Array, Sizes};
 use super::read_out::ReadOut;
+use super::stages::display::PIXELS;
+use super::stages::fuse::FUSED;
+use super::stages::inputs::{FRAME, TISSUES};
+use super::stages::mask::PRESCAN;
+use super::stages::shadow::SHADED;
 use super::tables::{Tables, tissue_seed};
 use super::{SimError, Simulator, machine, placement};
 use crate::gpu::{Buffer, Commands, Device, GpuError};
@@ -113,8 +118,8 @@ impl Lane {
             ..*tissue
         };
         let tissues: Vec<layout::Tissue> = tables.tissues.iter().enumerate().map(seeded).collect();
-        cmd.write(&self.buffers["tissues"], 0, bytemuck::cast_slice(&tissues))?;
-        cmd.write(&self.buffers["frame"], 0, bytemuck::bytes_of(&frame))?;
+        cmd.write(&self.buffers[&TISSUES], 0, bytemuck::cast_slice(&tissues))?;
+        cmd.write(&self.buffers[&FRAME], 0, bytemuck::bytes_of(&frame))?;
         self.frame = frame;
         Ok(())
     }
@@ -127,7 +132,7 @@ impl Lane {
     /// Mask and acquired volume along the scanlines, with shadows if the frame has them.
     pub(super) fn prescan(&self) -> &Buffer {
         let fusion = self.fusion.as_ref().expect("an image with a volume");
-        &self.buffers[if fusion.shaded { "shaded" } else { "prescan" }]
+        &self.buffers[if fusion.shaded { &SHADED } else { &PRESCAN }]
     }
 
     /// The finished image.
@@ -136,9 +141,9 @@ impl Lane {
     }
 }
 
-/// Name of the buffer of the finished image.
-pub(super) fn pixels(fused: bool) -> &'static str {
-    if fused { "fused" } else { "pixels" }
+/// The array of the finished image.
+pub(super) fn pixels(fused: bool) -> &'static Array {
+    if fused { &FUSED } else { &PIXELS }
 }
 
 impl Simulator {
@@ -168,17 +173,17 @@ impl Simulator {
         &self.passes.lanes[self.last.chosen]
     }
 
-    /// The content of buffer `name` of the chosen lane after the last frame. It is copied within the next frame if it
+    /// The content of an array of the chosen lane after the last frame. It is copied within the next frame if it
     /// was read after this one, so that reading it then takes no submission of its own.
-    pub(super) fn read_again(&mut self, name: &'static str) -> Result<Vec<u8>, SimError> {
+    pub(super) fn read_again(&mut self, array: &'static Array) -> Result<Vec<u8>, SimError> {
         let sizes = self.sizes();
         let lane = &mut self.passes.lanes[self.last.chosen];
-        let mut bytes = vec![0; lane.buffers.bytes(name, &sizes)];
-        match lane.read_out.take(name) {
+        let mut bytes = vec![0; lane.buffers.bytes(array, &sizes)];
+        match lane.read_out.take(array) {
             Some(copy) => self.submissions.read(copy, &mut bytes)?,
             None => {
                 self.submissions.wait()?;
-                self.device.read_into(&lane.buffers[name], 0, &mut bytes)?;
+                self.device.read_into(&lane.buffers[array], 0, &mut bytes)?;
             }
         }
         Ok(bytes)

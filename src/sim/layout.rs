@@ -364,35 +364,6 @@ pub const UNIT: u32 = 1;
 /// ([`crate::scene::smoothed::pack`]).
 pub const PACKED: u32 = 2;
 
-/// Push constants of `interpolate`: a weighted sum of vectors of keyframes. All places are counted in vectors
-/// from the beginning of the buffer.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-pub struct Interpolation {
-    /// Number of vectors to compute.
-    pub count: u32,
-    /// Place of the first result: it overlaps no source that is read, or is exactly one of them.
-    pub target: u32,
-    /// [`SUM`], [`UNIT`] or [`PACKED`].
-    pub kind: u32,
-    /// Words from one vector to the next: 3, or 4 of which the last stays as it is; 1 where they are packed.
-    pub stride: u32,
-    /// Place of each keyframe's first vector.
-    pub sources: [u32; 4],
-    /// Weight of each keyframe; one with weight 0 is not read.
-    pub weights: [f32; 4],
-}
-
-/// Push constants of `refit`: one level of a hierarchy.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
-pub struct RefitLevel {
-    /// Place of the level's first node in the list of node numbers.
-    pub first: u32,
-    /// Number of nodes.
-    pub count: u32,
-}
-
 /// A ray for the kernel `rays`, which intersects a list of rays.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]

@@ -42,6 +42,7 @@ pub mod pass;
 mod pass_kernels;
 mod passes;
 pub mod placement;
+pub mod push;
 mod read_out;
 mod resize;
 mod results;
@@ -196,7 +197,7 @@ impl Simulator {
     fn upload_tables(&self) -> Result<(), GpuError> {
         let buffers = &self.passes.lanes[0].buffers;
         let arrays = self.tables.arrays().into_iter().filter(|(_, bytes)| !bytes.is_empty());
-        let arrays: Vec<_> = arrays.map(|(name, bytes)| (&buffers[name], 0, bytes)).collect();
+        let arrays: Vec<_> = arrays.map(|(array, bytes)| (&buffers[array], 0, bytes)).collect();
         self.device.upload_many(&arrays)
     }
 

@@ -55,8 +55,8 @@ pub struct Array {
     pub entries: Option<fn(&Sizes) -> u64>,
     /// True if it is set to zero when a frame begins, because kernels add to it.
     pub zeroed: bool,
-    /// The buffer whose memory this one uses until that buffer is filled.
-    pub within: Option<&'static str>,
+    /// The array whose memory this one uses until that array is filled.
+    pub within: Option<&'static Array>,
 }
 
 impl Array {
@@ -75,6 +75,11 @@ impl Array {
         Self::new(name, element, size_of::<T>() / 4, entries)
     }
 
+    /// What each dispatch is given in a place of its own: a level of a pyramid, or an image.
+    pub const fn given(name: &'static str, element: Element, words: usize) -> Self {
+        Self { name, element, words, entries: None, zeroed: false, within: None }
+    }
+
     /// An array that is a part of the anatomy.
     pub const fn anatomy(name: &'static str, element: Element, words: usize) -> Self {
         Self { name, element, words, entries: None, zeroed: false, within: None }
@@ -85,8 +90,8 @@ impl Array {
         Self { zeroed: true, ..self }
     }
 
-    /// The same array in the memory of the array `other`.
-    pub const fn within(self, other: &'static str) -> Self {
+    /// The same array in the memory of another one.
+    pub const fn within(self, other: &'static Self) -> Self {
         Self { within: Some(other), ..self }
     }
 
@@ -126,11 +131,10 @@ pub struct Pass {
     pub variants: Variants,
     /// Specialization constants of the kernel, by id.
     pub constants: &'static [(u32, u32)],
-    /// The kernel's bindings in order: names of arrays; `nodes`, the structure that the tracer walks; `acquired`,
-    /// the volume.
-    pub binds: &'static [&'static str],
+    /// The kernel's bindings in order. Of `nodes` the structure that the tracer walks is bound, whatever it is made of.
+    pub binds: &'static [&'static Array],
     /// The buffers that this stage is the first to fill.
-    pub makes: &'static [Array],
+    pub makes: &'static [&'static Array],
     /// The size of its dispatch; none where each dispatch is given its own.
     pub extent: Option<fn(&Frame) -> Extent>,
     /// The stage of the pipeline that waits until it is done.

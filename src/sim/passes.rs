@@ -4,13 +4,14 @@ use super::batches::Batches;
 use super::contact::Skins;
 use super::lane::Lane;
 use super::layout;
-use super::pass::{Extent, Pass, Sizes};
+use super::pass::{Array, Extent, Pass, Sizes};
 use super::pass_kernels::PassKernels;
+use super::stages::mask::ACQUIRED;
 use super::world::World;
 use crate::gpu::{Binding, Buffer, Commands, GpuError, Stage};
 
-/// For a lane, the buffers that a dispatch binds instead of those of the same names.
-pub(super) type Instead<'g> = &'g dyn Fn(&Lane) -> Vec<(&'static str, &Buffer)>;
+/// For a lane, the buffers that a dispatch binds instead of those of the arrays beside them.
+pub(super) type Instead<'g> = &'g dyn Fn(&Lane) -> Vec<(&'static Array, &Buffer)>;
 
 /// The kernels, buffers and geometry on which the stages work.
 pub(super) struct Passes {
@@ -76,10 +77,10 @@ impl Passes {
         let kernel = self.kernels.of(pass, self.world.deforms());
         // By number: what a kernel declares and does not use is not in its SPIR-V.
         let binds = kernel.bindings().iter().map(|info| pass.binds[info.binding as usize]);
-        let binds: Vec<&str> = binds.collect();
+        let binds: Vec<&Array> = binds.collect();
         for lane in self.active() {
             let given = instead(lane);
-            let bound = binds.iter().map(|name| self.binding(lane, name, &given));
+            let bound = binds.iter().map(|array| self.binding(lane, array, &given));
             let bindings: Vec<Binding> = bound.collect();
             match extent {
                 Extent::Threads(threads) => cmd.dispatch(kernel, threads, push, &bindings)?,
@@ -93,15 +94,15 @@ impl Passes {
     fn binding<'a>(
         &'a self,
         lane: &'a Lane,
-        name: &str,
-        given: &[(&str, &'a Buffer)],
+        array: &Array,
+        given: &[(&Array, &'a Buffer)],
     ) -> Binding<'a> {
-        if let Some((_, buffer)) = given.iter().find(|(of, _)| *of == name) {
+        if let Some((_, buffer)) = given.iter().find(|(of, _)| of.name == array.name) {
             return Binding::Buffer(buffer);
         }
-        match (name, &lane.fusion) {
-            ("acquired", Some(fusion)) => Binding::Image(fusion.shown()),
-            _ => self.world.binding(name).unwrap_or_else(|| Binding::Buffer(&lane.buffers[name])),
+        match &lane.fusion {
+            Some(fusion) if array.name == ACQUIRED.name => Binding::Image(fusion.shown()),
+            _ => self.world.binding(array).unwrap_or_else(|| Binding::Buffer(&lane.buffers[array])),
         }
     }
 

@@ -4,12 +4,12 @@
 use std::collections::BTreeMap;
 
 use super::buffers::Buffers;
-use super::pass::Sizes;
+use super::pass::{Array, Sizes};
 use crate::gpu::{Buffer, BufferKind, Commands, GpuError};
 
 /// The copies of the last frame's results.
 #[derive(Default)]
-pub(super) struct ReadOut(BTreeMap<&'static str, ResultCopy>);
+pub(super) struct ReadOut(BTreeMap<&'static str, (&'static Array, ResultCopy)>);
 
 /// A result that was read at least once.
 #[derive(Default)]
@@ -30,25 +30,26 @@ impl ReadOut {
         buffers: &Buffers,
         sizes: &Sizes,
     ) -> Result<(), GpuError> {
-        for (name, result) in &mut self.0 {
+        for (array, result) in self.0.values_mut() {
             result.is_current = std::mem::take(&mut result.wanted);
             if !result.is_current {
                 continue;
             }
-            let from = &buffers[name];
+            let from = &buffers[*array];
             let copy = match result.copy.take().filter(|copy| copy.size() >= from.size()) {
                 Some(copy) => copy,
                 None => cmd.device().buffer("read out", from.size(), BufferKind::Readback)?,
             };
-            cmd.copy((from, 0), (&copy, 0), buffers.bytes(name, sizes) as u64)?;
+            cmd.copy((from, 0), (&copy, 0), buffers.bytes(array, sizes) as u64)?;
             result.copy = Some(copy);
         }
         Ok(())
     }
 
-    /// The copy of the last frame's result in buffer `name`, if there is one; asks for a copy of the next.
-    pub(super) fn take(&mut self, name: &'static str) -> Option<&Buffer> {
-        let result = self.0.entry(name).or_default();
+    /// The copy of an array of the last frame, if there is one; asks for a copy of the next.
+    pub(super) fn take(&mut self, array: &'static Array) -> Option<&Buffer> {
+        let (_, result) =
+            self.0.entry(array.name).or_insert_with(|| (array, ResultCopy::default()));
         result.wanted = true;
         result.copy.as_ref().filter(|_| result.is_current)
     }

@@ -2,7 +2,8 @@
 
 use super::contact::SkinContact;
 use super::fusion::FusionResources;
-use super::pass::Sizes;
+use super::pass::{Array, Sizes};
+use super::stages::{axial, beam, inputs, scatter, trace};
 use super::{Memory, SimError, Simulator, lane, layout, rf};
 use crate::probe::Probe;
 
@@ -41,7 +42,7 @@ impl Simulator {
     /// # Errors
     /// A Vulkan error.
     pub fn counters(&mut self) -> Result<layout::Counters, SimError> {
-        Ok(bytemuck::pod_read_unaligned(&self.read("counters")?))
+        Ok(bytemuck::pod_read_unaligned(&self.read(&inputs::COUNTERS)?))
     }
 
     /// The integer accumulators of the last frame, surface then volume echoes: complex pairs, [L][K]. Scatterers are those
@@ -50,11 +51,12 @@ impl Simulator {
     /// # Errors
     /// A Vulkan error.
     pub fn echoes(&mut self) -> Result<[Vec<i32>; 2], SimError> {
-        let both = [self.read("surface_echoes")?, self.read("volume_echoes")?];
+        let both = [self.read(&trace::SURFACE_ECHOES)?, self.read(&scatter::VOLUME_ECHOES)?];
         let [surface, mut volume]: [Vec<i32>; 2] =
             both.map(|bytes| bytemuck::pod_collect_to_vec(&bytes));
         if self.constants().points > 0 {
-            let points: Vec<i32> = bytemuck::pod_collect_to_vec(&self.read("point_echoes")?);
+            let points: Vec<i32> =
+                bytemuck::pod_collect_to_vec(&self.read(&scatter::POINT_ECHOES)?);
             volume.iter_mut().zip(points).for_each(|(sum, point)| *sum = sum.saturating_add(point));
         }
         Ok([surface, volume])
@@ -66,8 +68,9 @@ impl Simulator {
     /// # Errors
     /// A Vulkan error.
     pub fn segments(&mut self) -> Result<Vec<Vec<layout::Segment>>, SimError> {
-        let counts: Vec<u32> = bytemuck::pod_collect_to_vec(&self.read("segment_count")?);
-        let segments: Vec<layout::Segment> = bytemuck::pod_collect_to_vec(&self.read("segments")?);
+        let counts: Vec<u32> = bytemuck::pod_collect_to_vec(&self.read(&trace::SEGMENT_COUNT)?);
+        let segments: Vec<layout::Segment> =
+            bytemuck::pod_collect_to_vec(&self.read(&trace::SEGMENTS)?);
         let capacity = self.constants().segment_capacity as usize;
         let lines = segments.chunks(capacity).zip(&counts);
         Ok(lines.map(|(line, &count)| line[..capacity.min(count as usize)].to_vec()).collect())
@@ -78,7 +81,7 @@ impl Simulator {
     /// # Errors
     /// A Vulkan error.
     pub fn lateral(&mut self) -> Result<Vec<f32>, SimError> {
-        self.floats("lateral")
+        self.floats(&beam::LATERAL)
     }
 
     /// Complex baseband before TGC, relative to a perfect mirror: complex pairs, [L][K].
@@ -86,7 +89,7 @@ impl Simulator {
     /// # Errors
     /// A Vulkan error.
     pub fn iq(&mut self) -> Result<Vec<f32>, SimError> {
-        self.floats("iq")
+        self.floats(&axial::IQ)
     }
 
     /// Log-compressed envelope, 0..1: [L][K].
@@ -94,7 +97,7 @@ impl Simulator {
     /// # Errors
     /// A Vulkan error.
     pub fn log_image(&mut self) -> Result<Vec<f32>, SimError> {
-        self.floats("log_image")
+        self.floats(&axial::LOG_IMAGE)
     }
 
     /// Envelope after TGC, relative to a perfect mirror: [L][K].
@@ -122,17 +125,17 @@ impl Simulator {
         Ok((factor, rf::lines(probe, axial_sigma, lines, samples, &lateral, factor)))
     }
 
-    pub(super) fn floats(&mut self, name: &'static str) -> Result<Vec<f32>, SimError> {
-        Ok(bytemuck::pod_collect_to_vec(&self.read_again(name)?))
+    pub(super) fn floats(&mut self, array: &'static Array) -> Result<Vec<f32>, SimError> {
+        Ok(bytemuck::pod_collect_to_vec(&self.read_again(array)?))
     }
 
-    /// The content of buffer `name` after the last frame.
-    pub(super) fn read(&mut self, name: &str) -> Result<Vec<u8>, SimError> {
+    /// The content of an array after the last frame.
+    pub(super) fn read(&mut self, array: &Array) -> Result<Vec<u8>, SimError> {
         self.submissions.wait()?;
         let sizes = self.sizes();
         let buffers = &self.lane().buffers;
-        let mut bytes = vec![0; buffers.bytes(name, &sizes)];
-        self.device.read_into(&buffers[name], 0, &mut bytes)?;
+        let mut bytes = vec![0; buffers.bytes(array, &sizes)];
+        self.device.read_into(&buffers[array], 0, &mut bytes)?;
         Ok(bytes)
     }
 

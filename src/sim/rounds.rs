@@ -6,6 +6,7 @@ use super::layout::{
     self, FLAG_ROUGH_TRANSMISSION, Frame, Interaction, ROLE_BRANCHES, ROLE_MAIN, ROLE_WHOLE,
     SAMPLING_MAIN_PATH, TRACE_GROUP,
 };
+use super::push;
 use super::stages::TRACE;
 
 /// Largest buffer of interactions, bytes; frames that have more are traced by groups of lines.
@@ -59,14 +60,12 @@ const MOST_IN_BLOCK: u32 = 8;
 const SPARE_PIECES: u64 = 16;
 
 /// One dispatch.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Round {
     /// The role of its paths: [`ROLE_WHOLE`], [`ROLE_MAIN`] or [`ROLE_BRANCHES`].
     pub role: u32,
-    /// Push constants: first path, number of paths, first line, number of lines, pieces of work, most pieces that a
-    /// worker may take, which of two counters deals them out, paths in a block, workers of a work group, and 1 where main
-    /// paths are followed once more.
-    pub push: [u32; 10],
+    /// Its push constants.
+    pub push: push::Trace,
     /// Number of workers. Each takes one piece after the other, so that no thread waits for the longer path of
     /// another one.
     pub workers: u32,
@@ -75,8 +74,7 @@ pub struct Round {
 impl Round {
     /// The size of its dispatch: all threads of the work groups in which the workers are.
     pub fn threads(&self) -> [u32; 3] {
-        let [.., lanes, _] = self.push;
-        [self.workers.div_ceil(lanes) * TRACE_GROUP, 1, 1]
+        [self.workers.div_ceil(self.push.lanes) * TRACE_GROUP, 1, 1]
     }
 
     /// Specialization constants, by id, that make `trace` a kernel for one role.
@@ -177,7 +175,18 @@ impl Rounds {
             let most = 2 * pieces.div_ceil(workers);
             let few = workers * (TRACE_GROUP / FEW_LANES) <= self.at_once;
             let lanes = if few { FEW_LANES } else { TRACE_GROUP };
-            let push = [begin, count, line, lines, pieces, most, *turn, block, lanes, again];
+            let push = push::Trace {
+                path_begin: begin,
+                path_count: count,
+                line_begin: line,
+                line_count: lines,
+                pieces,
+                most,
+                turn: *turn,
+                block,
+                lanes,
+                again,
+            };
             *turn ^= 1;
             Round { role, push, workers }
         };
@@ -223,12 +232,12 @@ mod tests {
     fn lines(rounds: &[Round], role: u32) -> Vec<u32> {
         let mut taken = vec![0; 192 * 7];
         for round in rounds.iter().filter(|r| r.role == role) {
-            let first = round.push[2] as usize;
-            for line in &mut taken[first..first + round.push[3] as usize] {
+            let first = round.push.line_begin as usize;
+            for line in &mut taken[first..first + round.push.line_count as usize] {
                 *line += 1;
             }
-            assert_eq!(round.push[4] % round.push[3], 0);
-            assert!(round.workers * round.push[5] >= round.push[4]);
+            assert_eq!(round.push.pieces % round.push.line_count, 0);
+            assert!(round.workers * round.push.most >= round.push.pieces);
         }
         taken
     }
@@ -245,7 +254,7 @@ mod tests {
             assert_eq!(lines(&taken, ROLE_BRANCHES), [1; 192 * 7]);
             // Main paths that are alike are followed twice where there is no room for all of their interactions.
             let (first, again): (Vec<_>, Vec<_>) =
-                taken.iter().filter(|r| r.role == ROLE_MAIN).partition(|r| r.push[9] == 0);
+                taken.iter().filter(|r| r.role == ROLE_MAIN).partition(|r| r.push.again == 0);
             let [first, again] =
                 [first, again].map(|rounds| rounds.into_iter().copied().collect::<Vec<_>>());
             assert_eq!(lines(&first, ROLE_MAIN), [1; 192 * 7]);
@@ -258,7 +267,7 @@ mod tests {
             assert!(most(&all) <= Some(TRACE_GROUP * MOST_GROUPS));
             // Each dispatch leaves the other counter at zero for the next one.
             assert!(
-                taken.iter().zip([0, 1].into_iter().cycle()).all(|(r, turn)| r.push[6] == turn)
+                taken.iter().zip([0, 1].into_iter().cycle()).all(|(r, turn)| r.push.turn == turn)
             );
             // Main paths come before their branches; those that are alike all before any branches.
             let ahead = if again.is_empty() { 0 } else { first.len() };
@@ -271,7 +280,7 @@ mod tests {
     fn one_main_path_stands_for_all_that_are_alike() {
         let pieces = |frame: &Frame| {
             let rounds = Rounds::new(frame, 40, 1 << 18).of(frame, 0..40, &mut 0);
-            rounds.iter().map(|r| r.push[4]).collect::<Vec<_>>()
+            rounds.iter().map(|r| r.push.pieces).collect::<Vec<_>>()
         };
         let mut frame = frame(40, 32);
         assert_eq!(pieces(&frame), [1344, 1344 * 32 * 40]);
@@ -292,17 +301,20 @@ mod tests {
         assert_eq!(few.main_paths(), 448);
         let taken = few.of(&frame, 0..8, &mut 0);
         assert_eq!(
-            taken.iter().map(|r| r.push[9]).collect::<Vec<_>>(),
+            taken.iter().map(|r| r.push.again).collect::<Vec<_>>(),
             [0, 0, 0, 1, 0, 1, 0, 1, 0]
         );
         // Main paths of a large GPU are in groups of their own; here all threads of a group are needed.
         let large = Rounds::new(&frame, 8, 1 << 18).of(&frame, 0..8, &mut 0);
-        assert_eq!(large.iter().map(|r| r.push[8]).collect::<Vec<_>>(), [FEW_LANES, TRACE_GROUP]);
+        assert_eq!(
+            large.iter().map(|r| r.push.lanes).collect::<Vec<_>>(),
+            [FEW_LANES, TRACE_GROUP]
+        );
         assert_eq!(large[0].threads(), [8 * 1344, 1, 1]);
-        assert_eq!(taken[0].push[8], TRACE_GROUP);
+        assert_eq!(taken[0].push.lanes, TRACE_GROUP);
         // Few threads: as many paths at an interaction as a block takes.
-        assert_eq!(taken[4].push[7], MOST_IN_BLOCK);
-        assert_eq!(taken[4].push[4], 448 * 32);
+        assert_eq!(taken[4].push.block, MOST_IN_BLOCK);
+        assert_eq!(taken[4].push.pieces, 448 * 32);
         assert_eq!(lines(&taken, ROLE_BRANCHES), [1; 192 * 7]);
         assert_eq!(lines(&taken, ROLE_MAIN), [2; 192 * 7]);
         // A frame of 51 lines of one path of their own would trace them together, but there is room for two groups of 100.

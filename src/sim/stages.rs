@@ -24,25 +24,25 @@ pub use tint::TINT;
 pub use trace::TRACE;
 
 pub mod aperture;
-mod axial;
-mod beam;
+pub mod axial;
+pub mod beam;
 pub mod blur;
-mod chart;
-mod convert;
-mod display;
-mod expect;
-mod fuse;
-mod inputs;
-mod label;
-mod mask;
-mod origin;
-pub(super) mod paint;
-pub(super) mod pyramid;
+pub mod chart;
+pub mod convert;
+pub mod display;
+pub mod expect;
+pub mod fuse;
+pub mod inputs;
+pub mod label;
+pub mod mask;
+pub mod origin;
+pub mod paint;
+pub mod pyramid;
 pub mod scatter;
-mod shadow;
-mod tiles;
-pub(super) mod tint;
-mod trace;
+pub mod shadow;
+pub mod tiles;
+pub mod tint;
+pub mod trace;
 
 /// Stages of every frame, in order.
 pub const IMAGE: [&Pass; 9] =
@@ -87,11 +87,11 @@ pub(super) fn of(scene: &Scene) -> impl Iterator<Item = &'static Pass> {
 /// The buffers that a frame of `scene` needs.
 pub(super) fn needed(scene: &Scene) -> impl Iterator<Item = &'static Array> {
     let passes = of(scene).filter(|pass| (pass.needed)(scene));
-    INPUTS.iter().chain(passes.flat_map(|pass| pass.makes))
+    INPUTS.iter().chain(passes.flat_map(|pass| pass.makes)).copied()
 }
 
-/// The array that kernels bind under `name`; none if no stage has it.
-pub fn array(name: &str) -> Option<Array> {
-    let arrays = all().flat_map(|pass| pass.makes).chain(&INPUTS).chain(&ANATOMY);
-    arrays.copied().find(|array| array.name == name)
+/// The array of this name that a stage, the processor or the anatomy makes, for folders of arrays; none if nothing makes it.
+pub fn array(name: &str) -> Option<&'static Array> {
+    let mut made = all().flat_map(|pass| pass.makes).chain(&INPUTS).chain(&ANATOMY).copied();
+    made.find(|array| array.name == name)
 }

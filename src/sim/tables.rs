@@ -4,8 +4,11 @@ use super::calibration::{Calibration, ELEVATION_CUT, amplitude};
 use super::contact::reach;
 use super::layout;
 use super::lobe::{Lobes, MIRROR};
+use super::pass::Array;
 use super::placement::matrix_rows;
 use super::special::half_normal_coherence;
+use super::stages::expect::SPECKLE;
+use super::stages::inputs::{GREY, POINTS, ROWS, SCANLINES, SURFACES};
 use crate::probe::{Kind, Probe};
 use crate::scene::{Scene, Surface, Wire};
 use crate::settings::{
@@ -132,6 +135,10 @@ pub fn piece(sample_pitch: f64) -> u32 {
     halved.into_iter().find(fits).unwrap_or(layout::SCATTER_BIN / 8)
 }
 
+/// Arrays that the tables fill, which all images of a frame share. Tissues are not among them: their seeds may be others in
+/// every image.
+pub const ARRAYS: [&Array; 6] = [&SCANLINES, &ROWS, &SURFACES, &POINTS, &GREY, &SPECKLE];
+
 /// The tables that stay the same from frame to frame, in the device's layout.
 pub struct Tables {
     /// One per scanline, and one for the edge of the face.
@@ -172,17 +179,17 @@ impl Tables {
         constants(scene, 0, self.scales)
     }
 
-    /// Names of the buffers that the tables fill, with their content. Tissues are not among them: their seeds may be
-    /// others in every image.
-    pub fn arrays(&self) -> [(&'static str, &[u8]); 6] {
-        [
-            ("scanlines", bytemuck::cast_slice(&self.scanlines)),
-            ("rows", bytemuck::cast_slice(&self.rows)),
-            ("surfaces", bytemuck::cast_slice(&self.surfaces)),
-            ("points", bytemuck::cast_slice(&self.points)),
-            ("grey", bytemuck::cast_slice(&self.grey)),
-            ("speckle", bytemuck::cast_slice(&self.speckle)),
-        ]
+    /// [`ARRAYS`], each with its content.
+    pub fn arrays(&self) -> [(&'static Array, &[u8]); 6] {
+        let contents: [&[u8]; 6] = [
+            bytemuck::cast_slice(&self.scanlines),
+            bytemuck::cast_slice(&self.rows),
+            bytemuck::cast_slice(&self.surfaces),
+            bytemuck::cast_slice(&self.points),
+            bytemuck::cast_slice(&self.grey),
+            bytemuck::cast_slice(&self.speckle),
+        ];
+        std::array::from_fn(|i| (ARRAYS[i], contents[i]))
     }
 }
 

@@ -7,6 +7,7 @@ use super::contact::{self, Coupling};
 use super::lane::Shot;
 use super::line::OneLine;
 use super::passes::Passes;
+use super::stages::{inputs, label, trace};
 use super::tables::Tables;
 use super::world::World;
 use super::{SimError, layout, stages};
@@ -42,7 +43,7 @@ impl Passes {
         // A frame of fewer lines than the buffers were made for must not want more room.
         let buffers = &self.lanes[0].buffers;
         let budget = FrameBudget {
-            segments: buffers["segments"].size(),
+            segments: buffers[&trace::SEGMENTS].size(),
             at_once: self.batches.rounds.at_once,
             main_paths: buffers.room().main_paths,
         };
@@ -61,7 +62,7 @@ impl Passes {
             // What the last image was made of, where labels say what has moved since; for the first one its own.
             let last = self.last.replace(frame).unwrap_or(frame);
             if labelled {
-                cmd.write(&lane.buffers["frame_before"], 0, bytemuck::bytes_of(&last))?;
+                cmd.write(&lane.buffers[&label::FRAME_BEFORE], 0, bytemuck::bytes_of(&last))?;
             }
             if let Some(fusion) = &mut lane.fusion {
                 fusion.update(cmd, scene, &lane.buffers)?;
@@ -80,7 +81,7 @@ impl Passes {
         for (lane, shot) in self.lanes.iter_mut().zip(shots) {
             let coupling = Coupling::at(scene, &shot.world_from_probe, &mut self.skins);
             let shares = contact::table(scene, coupling.as_ref());
-            cmd.write(&lane.buffers["contact"], 0, bytemuck::cast_slice(&shares))?;
+            cmd.write(&lane.buffers[&inputs::CONTACT], 0, bytemuck::cast_slice(&shares))?;
             lane.touch = coupling.map(|coupling| coupling.touch);
         }
         Ok(())

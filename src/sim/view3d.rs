@@ -6,6 +6,7 @@ use glam::DVec3;
 
 use super::layout::{self, Frame};
 use super::shaders::Library;
+use super::stages::inputs;
 use super::tracer::Tracer;
 use super::{SimError, Simulator};
 use crate::gpu::{
@@ -179,7 +180,7 @@ impl Viewer3d {
         passes: &super::Passes,
         fused: bool,
     ) -> Result<(), GpuError> {
-        let (frame, world) = (&passes.lanes[0].buffers["frame"], &passes.world);
+        let (frame, world) = (&passes.lanes[0].buffers[&inputs::FRAME], &passes.world);
         // The constants of the last complete picture: the last frame may have been abandoned.
         let constants = sight.constants(&passes.shown);
         cmd.write(frame, 0, bytemuck::bytes_of(&passes.shown))?;

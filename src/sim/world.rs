@@ -15,7 +15,9 @@ use super::bvh::{BvhError, Splits};
 use super::fields::{Fields, padded};
 use super::layout;
 use super::memory::Memory;
+use super::pass::Array;
 use super::shaders::Library;
+use super::stages::inputs;
 use super::tracer::Tracer;
 use crate::gpu::{Binding, Buffer, BufferKind, Commands, Device, GpuError, Kernel, Stage};
 use crate::scene::{Keyframes, Scene, Strategy};
@@ -321,21 +323,26 @@ impl World {
         self.past.as_ref().map(|past| [&past.instances, &past.fields])
     }
 
-    /// The binding of `name`, if it is a part of the anatomy ([`super::stages::ANATOMY`]).
-    pub fn binding(&self, name: &str) -> Option<Binding<'_>> {
+    /// The binding of an array, if it is a part of the anatomy ([`super::stages::ANATOMY`]).
+    pub fn binding(&self, array: &Array) -> Option<Binding<'_>> {
         let geometry = &self.geometry;
-        Some(Binding::Buffer(match name {
-            "nodes" => return Some(self.structure()),
-            "instances" => &geometry.instances,
-            "vertices" => &geometry.vertices,
-            "normals" => &geometry.normals,
-            "smoothed" => &geometry.smoothed,
-            "triangles" => &geometry.triangles,
-            "fields" => &geometry.fields,
-            "instances_before" => &self.past.as_ref()?.instances,
-            "fields_before" => &self.past.as_ref()?.fields,
-            _ => return None,
-        }))
+        let is = |part: &Array| part.name == array.name;
+        if is(&inputs::NODES) {
+            return Some(self.structure());
+        }
+        let parts = [
+            (&inputs::INSTANCES, &geometry.instances),
+            (&inputs::VERTICES, &geometry.vertices),
+            (&inputs::NORMALS, &geometry.normals),
+            (&inputs::SMOOTHED, &geometry.smoothed),
+            (&inputs::TRIANGLES, &geometry.triangles),
+            (&inputs::FIELDS, &geometry.fields),
+        ];
+        let past = self.past.as_ref().map(|past| {
+            [(&inputs::INSTANCES_BEFORE, &past.instances), (&inputs::FIELDS_BEFORE, &past.fields)]
+        });
+        let mut parts = parts.into_iter().chain(past.into_iter().flatten());
+        parts.find(|(part, _)| is(part)).map(|(_, buffer)| Binding::Buffer(buffer))
     }
 
     /// True if the tissue of any instance deforms.

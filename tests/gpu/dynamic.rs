@@ -6,7 +6,7 @@ use insonify::gpu::{
     Binding, Buffer, BufferKind, Device, DynamicBlas, DynamicSource, Frames, Kernel, Stage, Tlas,
     TlasInstance,
 };
-use insonify::sim::layout::Interpolation;
+use insonify::sim::push;
 use insonify::sim::shaders::Library;
 
 use super::accel::ray_query_device;
@@ -157,13 +157,13 @@ fn frames_in_flight_refit_one_structure() {
     let shown: Vec<(f32, Buffer)> =
         (0..8).map(|frame| (frame as f32 / 7.0, rays.hits(&device))).collect();
     for (blend, hits) in &shown {
-        let push = Interpolation {
+        let push = push::Interpolate {
             count,
             target: 2 * count,
             sources: [0, count, 0, 0],
             weights: [1.0 - blend, *blend, 0.0, 0.0],
             stride: 3,
-            ..Interpolation::default()
+            ..push::Interpolate::default()
         };
         let mut commands = frames.begin().unwrap();
         let bindings = [Binding::Buffer(&vertices)];

@@ -5,7 +5,8 @@ use super::{Case, Check, Extent, Input, Job, Size, Subject};
 use crate::reference::interpolate;
 use glam::DVec4;
 use insonify::scene::smoothed::pack;
-use insonify::sim::layout::{Interpolation, PACKED, SUM, UNIT};
+use insonify::sim::layout::{PACKED, SUM, UNIT};
+use insonify::sim::push;
 
 pub const SUBJECT: Subject = Subject {
     name: "interpolate",
@@ -32,7 +33,7 @@ pub const SUBJECT: Subject = Subject {
     },
 };
 
-fn push(job: &Job) -> Interpolation {
+fn push(job: &Job) -> push::Interpolate {
     bytemuck::pod_read_unaligned(&job.push)
 }
 
@@ -45,7 +46,7 @@ fn job(case: Case, size: Size) -> Job {
         (Case::Odd, _) => 333,
         (Case::Modes | Case::NotFinite, _) => 200,
     };
-    let mut push = Interpolation {
+    let mut push = push::Interpolate {
         count,
         target: 4 * count,
         sources: [0, count, 2 * count, 3 * count],
@@ -57,7 +58,7 @@ fn job(case: Case, size: Size) -> Job {
             Case::Odd => 1,
             _ => 3,
         },
-        ..Interpolation::default()
+        ..push::Interpolate::default()
     };
     let mut values = Random(31).floats(5 * (push.stride * count) as usize, -1.0, 1.0);
     match case {
@@ -108,7 +109,7 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     let written: Vec<usize> =
         (0..3 * push.count as usize).map(|i| first + stride * (i / 3) + i % 3).collect();
     // What is added up, and how long the sum is.
-    let plain = Interpolation { kind: SUM, ..push };
+    let plain = push::Interpolate { kind: SUM, ..push };
     let sums = interpolate::interpolate(&plain, &before);
     let magnitude = |i: usize| {
         let parts = push.sources.iter().zip(push.weights);
@@ -139,10 +140,16 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
 }
 
 /// The same of packed vectors, as the twin unpacks them: their words round directions to 5e-4 rad, coherences to 1/126.
-fn packed(push: &Interpolation, before: &[f32], after: &[f32], expected: &[DVec4]) -> Vec<Check> {
+fn packed(
+    push: &push::Interpolate,
+    before: &[f32],
+    after: &[f32],
+    expected: &[DVec4],
+) -> Vec<Check> {
     let target = push.target as usize;
     let end = target + push.count as usize;
-    let alone = Interpolation { sources: [push.target; 4], weights: [1.0, 0.0, 0.0, 0.0], ..*push };
+    let alone =
+        push::Interpolate { sources: [push.target; 4], weights: [1.0, 0.0, 0.0, 0.0], ..*push };
     let made = interpolate::interpolate(&alone, after);
     let directions = |means: &[DVec4]| -> Vec<f64> {
         means.iter().flat_map(|v| v.truncate().to_array()).collect()

@@ -5,7 +5,7 @@ use super::{Case, Check, Extent, Input, Job, Size, Subject};
 use crate::reference::refit::{self, Child, Extent as Box3, Geometry};
 use insonify::scene::{Mesh, shapes};
 use insonify::sim::bvh::{MeshBvh, SceneBvh, levels};
-use insonify::sim::layout::RefitLevel;
+use insonify::sim::push;
 
 /// Words of a node.
 const WORDS: usize = 20;
@@ -39,7 +39,7 @@ pub const SUBJECT: Subject = Subject {
     },
 };
 
-fn push(job: &Job) -> RefitLevel {
+fn push(job: &Job) -> push::Refit {
     bytemuck::pod_read_unaligned(&job.push)
 }
 

@@ -67,7 +67,7 @@ pub fn run(
                 commands.dispatch_groups(kernel, *groups, &job.push, &bindings)
             }
             Extent::Rounds(rounds) => rounds.iter().try_for_each(|round| {
-                let push = bytemuck::cast_slice(&round.push);
+                let push = bytemuck::bytes_of(&round.push);
                 commands.dispatch(&by_role[&round.role], round.threads(), push, &bindings)?;
                 commands.barrier(Stage::Compute, Stage::Compute);
                 Ok(())

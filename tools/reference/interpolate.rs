@@ -3,11 +3,12 @@
 use glam::{DVec3, DVec4};
 
 use super::wavefront::unpacked;
-use insonify::sim::layout::{Interpolation, PACKED, SUM};
+use insonify::sim::layout::{PACKED, SUM};
+use insonify::sim::push;
 
 /// The `count` vectors that the kernel writes from `target` on; the fourth part is the coherence of those that are
 /// packed, else 0.
-pub fn interpolate(push: &Interpolation, values: &[f32]) -> Vec<DVec4> {
+pub fn interpolate(push: &push::Interpolate, values: &[f32]) -> Vec<DVec4> {
     let at = |vector: u32| {
         let at = (push.stride * vector) as usize;
         if push.kind == PACKED {
@@ -35,12 +36,12 @@ mod tests {
     #[test]
     fn vectors_lie_between_those_of_their_keyframes() {
         let values = [1.0, 2.0, 3.0, f32::NAN, 0.0, 0.0, 5.0, 10.0, -1.0];
-        let mut push = Interpolation {
+        let mut push = push::Interpolate {
             count: 1,
             sources: [0, 2, 1, 1],
             weights: [0.75, 0.25, 0.0, 0.0],
             stride: 3,
-            ..Interpolation::default()
+            ..push::Interpolate::default()
         };
         assert_eq!(
             interpolate(&push, &values),
@@ -56,7 +57,7 @@ mod tests {
         assert_eq!(interpolate(&push, &values), [DVec4::ZERO]);
         let means = [(DVec3::X, 1.0), (DVec3::Y, 0.0), (-DVec3::Z, 1.0 / 3.0)];
         let values = means.map(|(v, coherence)| f32::from_bits(pack(v, coherence)));
-        push = Interpolation {
+        push = push::Interpolate {
             kind: PACKED,
             stride: 1,
             sources: [0, 1, 2, 2],

@@ -5,16 +5,16 @@ use glam::Vec3A;
 use obvhs::aabb::Aabb;
 
 use super::MeshBvh;
-use crate::layout::RefitLevel;
+use crate::push;
 use crate::scene::Mesh;
 
 /// The nodes of hierarchies level by level, deepest first, in the order that `refit` needs.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Levels {
     /// Numbers of the nodes in the scene's buffer.
     pub order: Vec<u32>,
     /// The part of `order` for each dispatch, in sequence; there is a barrier between two dispatches.
-    pub ranges: Vec<RefitLevel>,
+    pub ranges: Vec<push::Refit>,
 }
 
 /// The levels of `trees`, each given with the number of its root in the scene's buffer
@@ -34,7 +34,7 @@ pub fn levels(trees: &[(&MeshBvh, u32)]) -> Levels {
     for nodes in by_level.into_iter().rev() {
         levels
             .ranges
-            .push(RefitLevel { first: levels.order.len() as u32, count: nodes.len() as u32 });
+            .push(push::Refit { first: levels.order.len() as u32, count: nodes.len() as u32 });
         levels.order.extend(nodes);
     }
     levels

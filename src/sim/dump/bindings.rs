@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::super::bvh::Splits;
 use super::super::fields::Fields;
+use super::super::stages::trace;
 use super::super::world::GeometryArrays;
 use super::super::{SimError, Simulator, Tracer, layout, stages};
 use super::DumpError;
@@ -48,9 +49,9 @@ pub(super) fn write(simulator: &mut Simulator, scene: &Scene, dir: &Path) -> Res
     };
 
     for array in simulator.lane().buffers.arrays() {
-        let mut values = simulator.read(array.name)?;
+        let mut values = simulator.read(array)?;
         if array.name == "segments" {
-            let counts = simulator.read("segment_count")?;
+            let counts = simulator.read(&trace::SEGMENT_COUNT)?;
             let capacity = frame.segment_capacity as usize;
             clear_unused(&mut values, bytemuck::cast_slice(&counts), capacity);
         }

@@ -1,5 +1,6 @@
 //! The intermediate images of the last fused frame, to look at and to run its kernels alone.
 
+use super::super::stages::{blur, convert, display, mask};
 use super::super::{SimError, Simulator};
 use crate::scene::Scene;
 #[cfg(doc)]
@@ -64,17 +65,17 @@ impl Simulator {
         let mut floats = |name| -> Result<Vec<f32>, SimError> {
             Ok(bytemuck::pod_collect_to_vec(&self.read(name)?))
         };
-        let mask = floats("mask")?;
-        let sums = floats(if banded { "mask" } else { "sums" })?;
+        let mask = floats(&convert::MASK_IMAGE)?;
+        let sums = floats(if banded { &convert::MASK_IMAGE } else { &blur::SUMS })?;
         let (masks, _) = mask.as_chunks::<2>();
         let (sums, _) = sums.as_chunks::<2>();
         let mean = |s: &[f32; 2]| if s[1] > 0.0 { s[0] / s[1] } else { 0.0 };
         Ok(Some(FusionSteps {
-            prescan: floats("prescan")?,
-            background: floats("background")?,
+            prescan: floats(&mask::PRESCAN)?,
+            background: floats(&convert::BACKGROUND)?,
             mask: masks.iter().map(|m| m[0]).collect(),
             blurred: sums.iter().map(mean).collect(),
-            simulated: self.read("pixels")?,
+            simulated: self.read(&display::PIXELS)?,
         }))
     }
 }

@@ -2,16 +2,17 @@
 
 use super::super::layout::{APERTURE_BANDS, Aperture, Frame, LEVEL_STEP};
 use super::super::pass::{Array, Extent, Pass, Sizes};
+use super::inputs::{FRAME, ROWS, SCANLINES};
 use crate::output::npy::Element::Float;
+
+/// By layer, node and scanline.
+pub const APERTURES: Array = Array::of::<Aperture>("apertures", Float, nodes);
 
 /// The stage; it runs behind the main paths and in front of all that echoes there.
 pub const APERTURE: Pass = Pass {
     name: "aperture",
-    binds: &["frame", "rows", "scanlines", "apertures"],
-    makes: &[
-        // By layer, node and scanline.
-        Array::of::<Aperture>("apertures", Float, nodes),
-    ],
+    binds: &[&FRAME, &ROWS, &SCANLINES, &APERTURES],
+    makes: &[&APERTURES],
     extent: Some(|frame: &Frame| extent(frame, u32::MAX)),
     // Kernels that read nothing of it bind it, too.
     needed: |_| true,

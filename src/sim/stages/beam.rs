@@ -2,22 +2,28 @@
 
 use super::super::layout::BEAM_LINES;
 use super::super::pass::{Array, Extent, Pass, Sizes};
+use super::inputs::{CONTACT, COUNTERS, FRAME, ROWS};
+use super::scatter::{POINT_ECHOES, VOLUME_ECHOES};
+use super::trace::SURFACE_ECHOES;
 use crate::output::npy::Element::Float;
+
+/// Complex samples smoothed across the scanlines.
+pub const LATERAL: Array = Array::new("lateral", Float, 2, Sizes::samples);
 
 /// The stage.
 pub const BEAM: Pass = Pass {
     name: "beam",
     binds: &[
-        "frame",
-        "rows",
-        "surface_echoes",
-        "volume_echoes",
-        "counters",
-        "lateral",
-        "contact",
-        "point_echoes",
+        &FRAME,
+        &ROWS,
+        &SURFACE_ECHOES,
+        &VOLUME_ECHOES,
+        &COUNTERS,
+        &LATERAL,
+        &CONTACT,
+        &POINT_ECHOES,
     ],
-    makes: &[Array::new("lateral", Float, 2, Sizes::samples)],
+    makes: &[&LATERAL],
     extent: Some(|f| Extent::Threads([f.samples, f.scanlines.div_ceil(BEAM_LINES), 1])),
     ..Pass::USUAL
 };

@@ -2,14 +2,19 @@
 
 use super::super::layout::Label;
 use super::super::pass::{Array, Pass, Sizes, per_pixel};
+use super::inputs::FRAME;
+use super::label::LABELS;
 use super::label::wanted;
 use crate::output::npy::Element::Word;
+
+/// What each pixel shows.
+pub const PIXEL_LABELS: Array = Array::of::<Label>("pixel_labels", Word, Sizes::pixels);
 
 /// The stage.
 pub const CHART: Pass = Pass {
     name: "chart",
-    binds: &["frame", "labels", "pixel_labels"],
-    makes: &[Array::of::<Label>("pixel_labels", Word, Sizes::pixels)],
+    binds: &[&FRAME, &LABELS, &PIXEL_LABELS],
+    makes: &[&PIXEL_LABELS],
     extent: Some(per_pixel),
     needed: wanted,
     ..Pass::USUAL

@@ -2,6 +2,14 @@
 
 use super::super::pass::{Array, Pass, Sizes};
 use super::super::passes::Passes;
+use super::aperture::{APERTURES, SHADES};
+use super::axial::LOG_IMAGE;
+use super::blur::SUMS;
+use super::convert::BACKGROUND;
+use super::inputs::{FRAME, GREY};
+use super::mask::{FUSION, PRESCAN};
+use super::pyramid::CHANGE;
+use super::tiles::TILE_LIST;
 use super::tiles::per_tile;
 use super::{CONVERT, DARKEN, DISPLAY, MASK, SHADOW};
 use crate::gpu::{Commands, GpuError, Stage};
@@ -9,22 +17,25 @@ use crate::output::npy::Element::Word;
 use crate::scene::{Fusion, Scene};
 use crate::settings::Blend;
 
+/// Simulated and acquired image mixed, RGBA.
+pub const FUSED: Array = Array::new("fused", Word, 1, Sizes::pixels);
+
 /// The stage.
 pub const FUSE: Pass = Pass {
     name: "fuse",
     binds: &[
-        "frame",
-        "fusion",
-        "log_image",
-        "grey",
-        "prescan",
-        "tiles",
-        "sums",
-        "fused",
-        "background",
-        "change",
+        &FRAME,
+        &FUSION,
+        &LOG_IMAGE,
+        &GREY,
+        &PRESCAN,
+        &TILE_LIST,
+        &SUMS,
+        &FUSED,
+        &BACKGROUND,
+        &CHANGE,
     ],
-    makes: &[Array::new("fused", Word, 1, Sizes::pixels)],
+    makes: &[&FUSED],
     extent: Some(per_tile),
     then: Stage::Transfer,
     needed: Scene::shows_volume,
@@ -38,7 +49,7 @@ impl Passes {
         if fusion.background_shadows {
             self.run(cmd, &SHADOW)?;
             if self.loses_by_aperture() {
-                self.converge(cmd, &|lane| vec![("apertures", &lane.buffers["shades"])])?;
+                self.converge(cmd, &|lane| vec![(&APERTURES, &lane.buffers[&SHADES])])?;
             }
             self.run(cmd, &DARKEN)?;
         }
@@ -47,9 +58,9 @@ impl Passes {
             // Not read without blending by bands.
             let change = match fusion.blend {
                 Blend::Multiband => lane.pyramid().change(),
-                Blend::Linear | Blend::Smooth => &lane.buffers["background"],
+                Blend::Linear | Blend::Smooth => &lane.buffers[&BACKGROUND],
             };
-            vec![("prescan", lane.prescan()), ("change", change)]
+            vec![(&PRESCAN, lane.prescan()), (&CHANGE, change)]
         })
     }
 
@@ -76,7 +87,7 @@ impl Passes {
             // Its output is read by kernels here, not only copied.
             cmd.barrier(Stage::Compute, Stage::Compute);
         }
-        self.run_with(cmd, &CONVERT, &|lane| vec![("prescan", lane.prescan())])
+        self.run_with(cmd, &CONVERT, &|lane| vec![(&PRESCAN, lane.prescan())])
     }
 
     /// Records the intermediate images of the last fused frame, which that has made only where it needed them.

@@ -3,37 +3,45 @@
 
 use super::super::layout::{Frame, Label};
 use super::super::pass::{Array, Extent, Pass, Sizes, Variants};
+use super::aperture::APERTURES;
+use super::inputs::{
+    CONTACT, COUNTERS, FIELDS, FIELDS_BEFORE, FRAME, INSTANCES, INSTANCES_BEFORE, NODES, NORMALS,
+    ROWS, SCANLINES, SMOOTHED, TISSUES, TRIANGLES, VERTICES,
+};
 use crate::output::npy::Element::Word;
 use crate::scene::Scene;
+
+/// Constants of the frame before.
+pub const FRAME_BEFORE: Array = Array::of::<Frame>("frame_before", Word, |_| 1);
+
+/// What each sample shows.
+pub const LABELS: Array = Array::of::<Label>("labels", Word, Sizes::samples);
 
 /// The stage.
 pub const LABEL: Pass = Pass {
     name: "label",
     variants: Variants::Tracer,
     binds: &[
-        "frame",
-        "tissues",
-        "instances",
-        "vertices",
-        "normals",
-        "smoothed",
-        "triangles",
-        "nodes",
-        "counters",
-        "scanlines",
-        "rows",
-        "contact",
-        "fields",
-        "frame_before",
-        "instances_before",
-        "fields_before",
-        "labels",
-        "apertures",
+        &FRAME,
+        &TISSUES,
+        &INSTANCES,
+        &VERTICES,
+        &NORMALS,
+        &SMOOTHED,
+        &TRIANGLES,
+        &NODES,
+        &COUNTERS,
+        &SCANLINES,
+        &ROWS,
+        &CONTACT,
+        &FIELDS,
+        &FRAME_BEFORE,
+        &INSTANCES_BEFORE,
+        &FIELDS_BEFORE,
+        &LABELS,
+        &APERTURES,
     ],
-    makes: &[
-        Array::of::<Frame>("frame_before", Word, |_| 1),
-        Array::of::<Label>("labels", Word, Sizes::samples),
-    ],
+    makes: &[&FRAME_BEFORE, &LABELS],
     extent: Some(|frame: &Frame| Extent::Groups([frame.scanlines, 1, 1])),
     needed: wanted,
     ..Pass::USUAL

@@ -3,19 +3,26 @@
 use super::super::labels::colours;
 use super::super::pass::{Array, Pass, Sizes, per_pixel};
 use super::super::passes::Passes;
+use super::super::push;
 use super::super::{SimError, Simulator};
+use super::chart::PIXEL_LABELS;
+use super::display::PIXELS;
+use super::inputs::FRAME;
 use crate::gpu::{Buffer, Commands, GpuError, Stage};
 use crate::output::npy::Element::Word;
 use crate::scene::Scene;
 
+/// Colour of each tissue, RGB.
+pub const COLOURS: Array = Array::new("colours", Word, 1, |s| s.tissues);
+
+/// The finished image with its tissues in colours, RGBA.
+pub const PAINTED: Array = Array::new("painted", Word, 1, Sizes::pixels);
+
 /// The stage.
 pub const PAINT: Pass = Pass {
     name: "paint",
-    binds: &["frame", "pixels", "pixel_labels", "colours", "painted"],
-    makes: &[
-        Array::new("colours", Word, 1, |s| s.tissues),
-        Array::new("painted", Word, 1, Sizes::pixels),
-    ],
+    binds: &[&FRAME, &PIXELS, &PIXEL_LABELS, &COLOURS, &PAINTED],
+    makes: &[&COLOURS, &PAINTED],
     extent: Some(per_pixel),
     then: Stage::Transfer,
     // Nothing in a scene needs it; `Outputs::painted` asks for it.
@@ -36,17 +43,17 @@ impl Passes {
         let colours = colours(scene).into_iter().map(|[r, g, b]| u32::from_le_bytes([r, g, b, 0]));
         let colours: Vec<u32> = colours.collect();
         for lane in &mut self.lanes[..self.active] {
-            lane.buffers.add(cmd.device(), PAINT.makes.iter())?;
-            cmd.write(&lane.buffers["colours"], 0, bytemuck::cast_slice(&colours))?;
+            lane.buffers.add(cmd.device(), PAINT.makes.iter().copied())?;
+            cmd.write(&lane.buffers[&COLOURS], 0, bytemuck::cast_slice(&colours))?;
         }
         cmd.barrier(Stage::Transfer, Stage::Compute);
         cmd.barrier(Stage::Compute, Stage::Compute);
         cmd.scope(PAINT.name);
         let threads = per_pixel(self.frame());
-        self.record(cmd, &PAINT, threads, &opacity.to_ne_bytes(), &|lane| {
-            vec![("pixels", lane.pixels(fused))]
+        self.record(cmd, &PAINT, threads, bytemuck::bytes_of(&push::Paint { opacity }), &|lane| {
+            vec![(&PIXELS, lane.pixels(fused))]
         })?;
-        Ok(&self.lanes[0].buffers["painted"])
+        Ok(&self.lanes[0].buffers[&PAINTED])
     }
 }
 
@@ -57,6 +64,6 @@ impl Simulator {
     /// # Errors
     /// A Vulkan error.
     pub fn painted_pixels(&mut self) -> Result<Option<Vec<u8>>, SimError> {
-        self.last.painted.then(|| self.read("painted")).transpose()
+        self.last.painted.then(|| self.read(&PAINTED)).transpose()
     }
 }

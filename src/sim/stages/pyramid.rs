@@ -2,14 +2,34 @@
 //! acquired one.
 
 use super::super::fusion::is_banded;
-use super::super::pass::{Extent, Pass, per_pixel};
+use super::super::pass::{Array, Extent, Pass, per_pixel};
 use super::super::passes::Passes;
+use super::super::push;
+use super::convert::{BACKGROUND, MASK_IMAGE};
+use super::display::PIXELS;
+use super::inputs::FRAME;
 use crate::gpu::{Commands, GpuError};
+use crate::output::npy::Element::Float;
+
+/// Sums of the finest level.
+pub const LEVEL_SUMS: Array = Array::given("level", Float, 4);
+
+/// Sums of a level.
+pub const FINE: Array = Array::given("fine", Float, 4);
+
+/// Sums of the next coarser level.
+pub const COARSE: Array = Array::given("coarse", Float, 4);
+
+/// What the coarser levels change.
+pub const COARSE_CHANGE: Array = Array::given("coarse_change", Float, 1);
+
+/// What a level and the coarser ones change.
+pub const CHANGE: Array = Array::given("change", Float, 1);
 
 /// The stage that computes the finest level.
 pub const DIFFERENCE: Pass = Pass {
     name: "difference",
-    binds: &["frame", "pixels", "background", "mask", "level"],
+    binds: &[&FRAME, &PIXELS, &BACKGROUND, &MASK_IMAGE, &LEVEL_SUMS],
     extent: Some(per_pixel),
     needed: is_banded,
     ..Pass::USUAL
@@ -17,12 +37,12 @@ pub const DIFFERENCE: Pass = Pass {
 
 /// The stage that computes a coarser level from the one below.
 pub const REDUCE: Pass =
-    Pass { name: "reduce", binds: &["fine", "coarse"], needed: is_banded, ..Pass::USUAL };
+    Pass { name: "reduce", binds: &[&FINE, &COARSE], needed: is_banded, ..Pass::USUAL };
 
 /// The stage that computes what a level and all coarser ones add.
 pub const COLLAPSE: Pass = Pass {
     name: "collapse",
-    binds: &["fine", "coarse", "coarse_change", "change"],
+    binds: &[&FINE, &COARSE, &COARSE_CHANGE, &CHANGE],
     needed: is_banded,
     ..Pass::USUAL
 };
@@ -37,16 +57,16 @@ impl Passes {
             let [width, height] = size_at(size, level);
             Extent::Threads([width, height, 1])
         };
-        self.run_with(cmd, &DIFFERENCE, &|lane| vec![("level", &lane.pyramid().level(0).sums)])?;
+        self.run_with(cmd, &DIFFERENCE, &|lane| {
+            vec![(&LEVEL_SUMS, &lane.pyramid().level(0).sums)]
+        })?;
         cmd.scope(REDUCE.name);
         for level in 0..top {
-            let push = size_at(size, level);
+            let [width, height] = size_at(size, level);
+            let push = push::Reduce { width, height };
             self.record(cmd, &REDUCE, threads(level + 1), bytemuck::bytes_of(&push), &|lane| {
                 let pyramid = lane.pyramid();
-                vec![
-                    ("fine", &pyramid.level(level).sums),
-                    ("coarse", &pyramid.level(level + 1).sums),
-                ]
+                vec![(&FINE, &pyramid.level(level).sums), (&COARSE, &pyramid.level(level + 1).sums)]
             })?;
         }
         cmd.scope(COLLAPSE.name);
@@ -54,15 +74,15 @@ impl Passes {
             let [width, height] = size_at(size, level);
             // The coarsest level does not read a coarser one; any buffer is bound in its place.
             let coarsest = level == top;
-            let push = [width, height, u32::from(coarsest)];
+            let push = push::Collapse { width, height, coarsest: coarsest.into() };
             self.record(cmd, &COLLAPSE, threads(level), bytemuck::bytes_of(&push), &|lane| {
                 let pyramid = lane.pyramid();
                 let (here, above) = (pyramid.level(level), pyramid.level((level + 1).min(top)));
                 vec![
-                    ("fine", &here.sums),
-                    ("coarse", &above.sums),
-                    ("coarse_change", if coarsest { &above.sums } else { &above.change }),
-                    ("change", &here.change),
+                    (&FINE, &here.sums),
+                    (&COARSE, &above.sums),
+                    (&COARSE_CHANGE, if coarsest { &above.sums } else { &above.change }),
+                    (&CHANGE, &here.change),
                 ]
             })?;
         }

@@ -3,38 +3,41 @@
 use super::super::batches::per_path;
 use super::super::layout::{Frame, SCATTER_WINDOW};
 use super::super::pass::{Array, Extent, Pass, Sizes, Variants};
+use super::aperture::APERTURES;
+use super::inputs::{COUNTERS, FIELDS, FRAME, INSTANCES, POINTS, ROWS, SCANLINES, TISSUES};
+use super::trace::{SEGMENT_COUNT, SEGMENTS};
 use crate::output::npy::Element::Integer;
 
+/// Echoes of scatterers: complex, fixed-point sums by scanline and sample.
+pub const VOLUME_ECHOES: Array = Array::new("volume_echoes", Integer, 2, Sizes::samples).zeroed();
+
+/// Point targets are as wide as the beam at once, and are not smoothed with the scatterers.
+pub const POINT_ECHOES: Array =
+    Array::new("point_echoes", Integer, 2, |s| if s.frame.points > 0 { s.samples() } else { 1 })
+        .zeroed();
+
 /// The stage.
-pub const SCATTER: Pass =
-    Pass {
-        name: "scatter",
-        variants: Variants::Tissue,
-        binds: &[
-            "frame",
-            "tissues",
-            "instances",
-            "rows",
-            "points",
-            "segments",
-            "segment_count",
-            "volume_echoes",
-            "counters",
-            "scanlines",
-            "fields",
-            "point_echoes",
-            "apertures",
-        ],
-        makes: &[
-            Array::new("volume_echoes", Integer, 2, Sizes::samples).zeroed(),
-            // Point targets are as wide as the beam at once, and are not smoothed with the scatterers.
-            Array::new("point_echoes", Integer, 2, |s| {
-                if s.frame.points > 0 { s.samples() } else { 1 }
-            })
-            .zeroed(),
-        ],
-        ..Pass::USUAL
-    };
+pub const SCATTER: Pass = Pass {
+    name: "scatter",
+    variants: Variants::Tissue,
+    binds: &[
+        &FRAME,
+        &TISSUES,
+        &INSTANCES,
+        &ROWS,
+        &POINTS,
+        &SEGMENTS,
+        &SEGMENT_COUNT,
+        &VOLUME_ECHOES,
+        &COUNTERS,
+        &SCANLINES,
+        &FIELDS,
+        &POINT_ECHOES,
+        &APERTURES,
+    ],
+    makes: &[&VOLUME_ECHOES, &POINT_ECHOES],
+    ..Pass::USUAL
+};
 
 /// Parts into which the segments of a scanline are divided to keep a large GPU busy. Each part weighs all segments
 /// against each other once more, so that more of them are slower again: H200, segments of 7 layers, 1 / 2 / 4 / 8

@@ -3,15 +3,21 @@
 use super::super::layout::{Frame, MASK_BLOCK};
 use super::super::pass::{Array, Extent, Pass, Sizes};
 use super::super::passes::Passes;
+use super::super::push;
+use super::inputs::FRAME;
+use super::mask::{FUSION, MASK_BLOCKS};
 use crate::gpu::{Commands, GpuError};
 use crate::output::npy::Element::Word;
 use crate::scene::Scene;
 
+/// Bits of each tile: which of both images it shows, and whether they are blurred.
+pub const TILE_LIST: Array = Array::new("tiles", Word, 1, |s| s.tiles()).zeroed();
+
 /// The stage.
 pub const TILES: Pass = Pass {
     name: "tiles",
-    binds: &["frame", "fusion", "mask_blocks", "tiles"],
-    makes: &[Array::new("tiles", Word, 1, |s| s.tiles()).zeroed()],
+    binds: &[&FRAME, &FUSION, &MASK_BLOCKS, &TILE_LIST],
+    makes: &[&TILE_LIST],
     extent: Some(|frame| {
         let [across, down] = frame.tiles();
         Extent::Threads([across, down, 1])
@@ -43,7 +49,7 @@ impl Passes {
     pub(crate) fn tiles(&self, cmd: &mut Commands<'_>, whole: bool) -> Result<(), GpuError> {
         cmd.scope(TILES.name);
         let extent = TILES.extent.expect("stated above")(self.frame());
-        let push = u32::from(whole);
+        let push = push::Tiles { complete: whole.into() };
         self.record(cmd, &TILES, extent, bytemuck::bytes_of(&push), &|_| Vec::new())
     }
 }

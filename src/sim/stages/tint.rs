@@ -2,15 +2,25 @@
 
 use super::super::pass::{Array, Pass, Sizes, per_pixel};
 use super::super::passes::Passes;
+use super::super::push;
 use super::super::{SimError, Simulator};
+use super::blur::SUMS;
+use super::convert::MASK_IMAGE;
+use super::fuse::FUSED;
+use super::inputs::FRAME;
+use super::mask::FUSION;
+use super::tiles::TILE_LIST;
 use crate::gpu::{Buffer, Commands, GpuError, Stage};
 use crate::output::npy::Element::Word;
+
+/// The finished image with its acquired pixels coloured, RGBA.
+pub const TINTED: Array = Array::new("tinted", Word, 1, Sizes::pixels);
 
 /// The stage.
 pub const TINT: Pass = Pass {
     name: "tint",
-    binds: &["frame", "fusion", "fused", "mask", "sums", "tiles", "tinted"],
-    makes: &[Array::new("tinted", Word, 1, Sizes::pixels)],
+    binds: &[&FRAME, &FUSION, &FUSED, &MASK_IMAGE, &SUMS, &TILE_LIST, &TINTED],
+    makes: &[&TINTED],
     extent: Some(per_pixel),
     then: Stage::Transfer,
     // Nothing in a scene needs it; `Outputs::tinted` asks for it.
@@ -36,15 +46,16 @@ impl Passes {
         tint: &Tint,
     ) -> Result<&Buffer, GpuError> {
         for lane in &mut self.lanes[..self.active] {
-            lane.buffers.add(cmd.device(), TINT.makes.iter())?;
+            lane.buffers.add(cmd.device(), TINT.makes.iter().copied())?;
         }
-        let mut push = tint.opacity.to_ne_bytes().to_vec();
         let [r, g, b] = tint.colour;
-        push.extend(u32::from_le_bytes([r, g, b, 0]).to_ne_bytes());
+        let push = push::Tint { opacity: tint.opacity, colour: u32::from_le_bytes([r, g, b, 0]) };
         cmd.barrier(Stage::Compute, Stage::Compute);
         cmd.scope(TINT.name);
-        self.record(cmd, &TINT, per_pixel(self.frame()), &push, &|_| Vec::new())?;
-        Ok(&self.lanes[0].buffers["tinted"])
+        self.record(cmd, &TINT, per_pixel(self.frame()), bytemuck::bytes_of(&push), &|_| {
+            Vec::new()
+        })?;
+        Ok(&self.lanes[0].buffers[&TINTED])
     }
 }
 
@@ -55,6 +66,6 @@ impl Simulator {
     /// # Errors
     /// A Vulkan error.
     pub fn tinted_pixels(&mut self) -> Result<Option<Vec<u8>>, SimError> {
-        self.last.tinted.then(|| self.read("tinted")).transpose()
+        self.last.tinted.then(|| self.read(&TINTED)).transpose()
     }
 }

@@ -10,7 +10,8 @@ use super::{GeometryBuffers, ShapeKernels, WorldError};
 use crate::bvh::{MeshBvh, levels};
 use crate::fields::Fields;
 use crate::gpu::{Binding, Buffer, BufferKind, Commands, Device, GpuError, Stage};
-use crate::layout::{Interpolation, PACKED, RefitLevel, SUM, UNIT};
+use crate::layout::{PACKED, SUM, UNIT};
+use crate::push;
 use crate::scene::smoothed::LEVELS;
 use crate::scene::{Instance, Scene, Strategy};
 use crate::tracer::Tracer;
@@ -23,7 +24,7 @@ const REBUILD_COST: f64 = 1.5;
 struct BaseTree {
     tree: MeshBvh,
     /// Ranges in the list of node numbers, one per level.
-    levels: Vec<RefitLevel>,
+    levels: Vec<push::Refit>,
 }
 
 /// An instance whose keyframes share their triangles.
@@ -128,7 +129,7 @@ impl Refit {
         top: &mut TopLevel,
     ) -> Result<(), GpuError> {
         // All shapes lie in one buffer: a barrier between two dispatches that write it.
-        let mut ranges: Vec<&[RefitLevel]> = Vec::new();
+        let mut ranges: Vec<&[push::Refit]> = Vec::new();
         for &(index, _) in due {
             let (Some(body), Some(region)) = (&self.bodies[index], &regions[index]) else {
                 continue;
@@ -149,13 +150,13 @@ impl Refit {
                 )?;
             }
             if let Some(blend) = fields.blend(scene, index) {
-                let push = Interpolation {
+                let push = push::Interpolate {
                     count: blend.count,
                     target: blend.target,
                     sources: blend.sources.map(|(at, _)| at),
                     weights: blend.sources.map(|(_, weight)| weight as f32),
                     stride: 4,
-                    ..Interpolation::default()
+                    ..push::Interpolate::default()
                 };
                 commands.dispatch(
                     &self.kernels.interpolate,
@@ -208,10 +209,10 @@ fn interpolation(
     region: &GeometryRange,
     kind: u32,
     each: u32,
-) -> Interpolation {
+) -> push::Interpolate {
     let keyframes = &instance.keyframes;
     let source = |k: usize| each * places[keyframes.meshes[k]].first_vertex;
-    let mut push = Interpolation {
+    let mut push = push::Interpolate {
         count: each * scene.meshes[keyframes.meshes[0]].positions.len() as u32,
         target: each * region.first_vertex,
         kind,

@@ -1,0 +1,108 @@
+//! Push constants of the kernels, as their sources declare them: a test compares names, places and sizes.
+
+use bytemuck::{Pod, Zeroable};
+
+macro_rules! push {
+    ($($(#[$doc:meta])* $kernel:literal $name:ident { $($(#[$about:meta])* $field:ident: $ty:ty,)* })*) => {
+        $(
+            $(#[$doc])*
+            #[repr(C)]
+            #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+            pub struct $name {
+                $($(#[$about])* pub $field: $ty,)*
+            }
+        )*
+
+        /// Kernels, with the name, the offset and the size of each of their push constants.
+        pub const ALL: &[(&str, &[(&str, usize, usize)])] = &[$((
+            $kernel,
+            &[$((stringify!($field), std::mem::offset_of!($name, $field), size_of::<$ty>())),*],
+        )),*];
+    };
+}
+
+push! {
+    /// A dispatch of `trace`: paths of lines, dealt out to workers.
+    "trace" Trace {
+        /// First path of each line.
+        path_begin: u32,
+        /// Number of paths of each line.
+        path_count: u32,
+        /// First line.
+        line_begin: u32,
+        /// Number of lines.
+        line_count: u32,
+        /// Pieces of work; the line varies fastest.
+        pieces: u32,
+        /// Most pieces that one worker takes.
+        most: u32,
+        /// Counter, of two, that deals them out; the other one is for the next dispatch.
+        turn: u32,
+        /// Paths that a worker takes one after the other at an interaction.
+        block: u32,
+        /// Threads of a work group that are workers.
+        lanes: u32,
+        /// 1: main paths are followed once more, for their interactions only.
+        again: u32,
+    }
+    /// A weighted sum of vectors of keyframes. All places are counted in vectors from the beginning of the buffer.
+    "interpolate" Interpolate {
+        /// Number of vectors to compute.
+        count: u32,
+        /// Place of the first result: it overlaps no source that is read, or is exactly one of them.
+        target: u32,
+        /// [`SUM`](super::layout::SUM), [`UNIT`](super::layout::UNIT) or [`PACKED`](super::layout::PACKED).
+        kind: u32,
+        /// Words from one vector to the next: 3, or 4 of which the last stays as it is; 1 where they are packed.
+        stride: u32,
+        /// Place of each keyframe's first vector.
+        sources: [u32; 4],
+        /// Weight of each keyframe; one with weight 0 is not read.
+        weights: [f32; 4],
+    }
+    /// Nodes of one level of a tree, all of whose inner children are done.
+    "refit" Refit {
+        /// Place of the first one in the order.
+        first: u32,
+        /// Number of nodes.
+        count: u32,
+    }
+    /// A level of the pyramid of differences.
+    "collapse" Collapse {
+        /// Width of the finer level, pixels.
+        width: u32,
+        /// Height of the finer level, pixels.
+        height: u32,
+        /// 1: there is no coarser level.
+        coarsest: u32,
+    }
+    /// A level of the pyramid of differences.
+    "reduce" Reduce {
+        /// Width of the level below, pixels.
+        width: u32,
+        /// Height of the level below, pixels.
+        height: u32,
+    }
+    /// One of the two directions of the blur.
+    "blur" Blur {
+        /// 1: the mask has rows and columns exchanged.
+        turned: u32,
+    }
+    /// What tiles are sorted for.
+    "tiles" Tiles {
+        /// 1: every intermediate image is wanted everywhere.
+        complete: u32,
+    }
+    /// Colour of acquired pixels.
+    "tint" Tint {
+        /// Opacity over a pixel that is all acquired, 0 to 1.
+        opacity: f32,
+        /// Red, green and blue, from the lowest byte.
+        colour: u32,
+    }
+    /// Colour of tissues.
+    "paint" Paint {
+        /// Opacity, 0 to 1.
+        opacity: f32,
+    }
+}
