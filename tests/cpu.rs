@@ -10,10 +10,10 @@ mod common {
 mod animated;
 mod calibration;
 mod dicom;
-mod directions;
 mod docs;
 mod keyframes;
 mod layout;
 mod plus;
+mod sources;
 mod spirv;
 mod volumes;
