@@ -132,7 +132,17 @@ fn every_sampling_scatter_mode_and_probe_renders() {
     for mode in modes {
         let out = render(
             "scenes/abdomen.toml",
-            &["--set", mode, "--quality", "draft", "-o", path(&png), "--validate"],
+            &[
+                "--set",
+                mode,
+                "--set",
+                "probe.scanlines=64",
+                "--quality",
+                "draft",
+                "-o",
+                path(&png),
+                "--validate",
+            ],
         );
         assert!(out.status.success(), "{mode}: {}", text(&out.stderr));
         let image = image::open(&png).expect("a PNG").into_luma8();

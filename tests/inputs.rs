@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
 
-use crate::common::limited::{Outcome, check, files, limited};
+use crate::common::limited::{Outcome, check, files, limited, limited_to};
 use crate::common::shared_data::shared_data;
 use crate::common::skip::{Lacking, skip};
 
@@ -257,7 +257,7 @@ fn the_limits_of_memory_and_time_hold() {
     // Which code says so, each `tail` has its own.
     assert_ne!(hungry.code, Some(0), "{}", hungry.text);
     assert!(verdict(Path::new("x"), &hungry).is_some());
-    let slow = limited("while :; do :; done", Path::new("x"));
+    let slow = limited_to(1, "while :; do :; done", Path::new("x"));
     assert!(verdict(Path::new("x"), &slow).is_some(), "{}", slow.text);
 }
 

@@ -95,7 +95,7 @@ fn reached(way: &[(DVec2, f64)], power: f64) -> DVec2 {
 }
 
 /// Images of a lie: by speckle alone one of them is off by some percent.
-const IMAGES: u32 = 25;
+const IMAGES: u32 = 12;
 
 /// Images of the fetus as it lies, each with other speckle.
 fn pictures(lie: &Lie) -> Vec<Picture> {

@@ -24,9 +24,14 @@ pub fn check(path: &Path) -> Outcome {
 
 /// A shell script with the program as `$0` and the file as `$1`.
 pub fn limited(script: &str, path: &Path) -> Outcome {
+    limited_to(SECONDS, script, path)
+}
+
+/// Like [`limited`], with so many seconds of the processor.
+pub fn limited_to(seconds: u32, script: &str, path: &Path) -> Outcome {
     let output = Command::new("sh")
         .arg("-c")
-        .arg(format!("ulimit -v {KILOBYTES}; ulimit -t {SECONDS}; {script}"))
+        .arg(format!("ulimit -v {KILOBYTES}; ulimit -t {seconds}; {script}"))
         .arg(env!("CARGO_BIN_EXE_insonify"))
         .arg(path)
         .timeout(PATIENCE)

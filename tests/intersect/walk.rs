@@ -13,6 +13,9 @@ pub fn walk(rig: &Rig, rays: &[Ray], margin: f64) -> Vec<Vec<(f64, usize, bool)>
     let mut found = vec![Vec::new(); rays.len()];
     let mut active: Vec<(usize, Ray)> = rays.iter().copied().enumerate().collect();
     for _ in 0..64 {
+        if active.is_empty() {
+            break;
+        }
         let list: Vec<Ray> = active.iter().map(|a| a.1).collect();
         let hits = rig.trace(&list);
         active = active
@@ -57,13 +60,14 @@ pub fn clear_hits(
             || (w[1].t - w[0].t < 1e-9 * w[1].t && twins(w[0].instance, w[1].instance))
     });
     let delta = displacement(scene, ray, hits.last().map_or(0.0, |h| h.t));
-    let same = around(d, 12).all(|aside| {
-        let moved = once(o + aside * delta);
-        moved.len() == hits.len()
-            && moved
-                .iter()
-                .zip(&hits)
-                .all(|(a, b)| a.instance == b.instance && (a.t - b.t).abs() < gap / 2.0)
-    });
-    (apart && same).then_some(hits)
+    let same = apart
+        && around(d, 12).all(|aside| {
+            let moved = once(o + aside * delta);
+            moved.len() == hits.len()
+                && moved
+                    .iter()
+                    .zip(&hits)
+                    .all(|(a, b)| a.instance == b.instance && (a.t - b.t).abs() < gap / 2.0)
+        });
+    same.then_some(hits)
 }

@@ -1,6 +1,12 @@
 //! The parts of a proof: figures compared with closed forms, with curves and pictures that show them. Tests and
 //! the report take their verdicts from here.
 
+use std::any::Any;
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::fmt::Debug;
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::rc::Rc;
 use std::sync::Arc;
 
 use insonify::gpu;
@@ -122,6 +128,29 @@ impl Outcome {
     }
 }
 
+/// Results by what they were made of, for the run with the planted error: what it leaves alone is made once.
+#[derive(Clone, Default)]
+pub struct Memo(Rc<RefCell<HashMap<u64, Rc<dyn Any>>>>);
+
+impl Memo {
+    /// The result of `make`, or what it was for an equal `of`, which names everything that `make` depends on. `keep`: false
+    /// where there is no room for another one.
+    pub fn once<T: 'static>(&self, of: &impl Debug, keep: bool, make: impl FnOnce() -> T) -> Rc<T> {
+        let mut key = DefaultHasher::new();
+        format!("{} {of:?}", std::any::type_name::<T>()).hash(&mut key);
+        let key = key.finish();
+        let kept = self.0.borrow().get(&key).cloned();
+        let made = kept.unwrap_or_else(|| {
+            let made: Rc<dyn Any> = Rc::new(make());
+            if keep {
+                self.0.borrow_mut().insert(key, Rc::clone(&made));
+            }
+            made
+        });
+        made.downcast().expect("its type is part of the key")
+    }
+}
+
 /// The device and the renderers for checks.
 pub struct Bench {
     pub device: Arc<gpu::Device>,
@@ -130,6 +159,8 @@ pub struct Bench {
     pub tracers: &'static [Tracer],
     /// The f64 twins, and the device with each of the tracers.
     pub renderers: Vec<Renderer>,
+    /// What both runs of a check share.
+    pub memo: Memo,
 }
 
 /// Both tracers.
@@ -149,7 +180,8 @@ impl Bench {
     }
 
     fn with(device: Arc<gpu::Device>, tracers: &'static [Tracer]) -> Self {
-        Self { renderers: renderers(&device, tracers), device, tracers }
+        let memo = Memo::default();
+        Self { renderers: renderers(&device, tracers, &memo), device, tracers, memo }
     }
 }
 

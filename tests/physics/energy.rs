@@ -93,20 +93,21 @@ fn layers(sampling: Sampling) -> Scene {
     scene
 }
 
-/// Fates of one frame's segments; weights of paths on their way back are multiplied by `planted`.
-fn account(segments: &[Segment], planted: f64) -> [f64; 5] {
-    let mut fates = [0.0; 5];
+/// Fates of one frame's segments: of paths on their way away from the probe, and on their way back.
+fn account(segments: &[Segment]) -> [[f64; 5]; 2] {
+    let mut ways = [[0.0; 5]; 2];
     for s in segments {
-        let weight = s.weight * if s.direction.z < 0.0 { planted } else { 1.0 };
+        let back = s.direction.z < 0.0;
+        let fates = &mut ways[usize::from(back)];
         let layer = s.tissue as usize;
-        let left = weight * (-absorption(layer) * s.length).exp();
-        fates[layer] += weight - left;
+        let left = s.weight * (-absorption(layer) * s.length).exp();
+        fates[layer] += s.weight - left;
         let end = s.origin.z + s.direction.z * s.length;
-        if s.direction.z < 0.0 && end.abs() < 1e-3 {
+        if back && end.abs() < 1e-3 {
             fates[4] += left;
         }
     }
-    fates
+    ways
 }
 
 const SEEDS: u32 = 100;
@@ -152,22 +153,28 @@ fn audit(bench: &Bench, physics: Physics) -> Outcome {
             Physics::Right => 1.0,
             Physics::Planted => reflectance(0),
         };
-        let mut seeds = |frame: &mut dyn FnMut(&Scene) -> Vec<Segment>| -> Vec<[f64; 5]> {
-            (1..=SEEDS)
-                .map(|seed| {
+        let mut seeds = |by: &str, frame: &mut dyn FnMut(&Scene) -> Vec<Segment>| {
+            let ways = bench.memo.once(&(by, sampling), true, || {
+                let ways = (1..=SEEDS).map(|seed| {
                     scene.simulation.seed = seed;
-                    account(&frame(&scene), planted)
-                })
-                .collect()
+                    account(&frame(&scene))
+                });
+                ways.collect::<Vec<_>>()
+            });
+            let all = ways
+                .iter()
+                .map(|[away, back]| std::array::from_fn(|i| away[i] + planted * back[i]));
+            all.collect::<Vec<[f64; 5]>>()
         };
         let mut results = vec![(
             "twins".to_owned(),
-            seeds(&mut |scene| Inputs::new(scene).traced().segments.concat()),
+            seeds("twins", &mut |scene| Inputs::new(scene).traced().segments.concat()),
         )];
         for &tracer in bench.tracers {
             let mut range = Range::new(bench, &layers(sampling), tracer);
-            let frames = seeds(&mut |scene| range.shoot(scene).segments.concat());
-            results.push((tracer.to_string(), frames));
+            let name = tracer.to_string();
+            let frames = seeds(&name, &mut |scene| range.shoot(scene).segments.concat());
+            results.push((name, frames));
         }
         for (name, frames) in results {
             let name = format!("{name}, {sampling:?}");

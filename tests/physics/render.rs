@@ -1,6 +1,8 @@
 //! Frames by the f64 twins, brute force from rays to pixels, and by the device with either tracer.
 
+use std::cell::Cell;
 use std::ops::Deref;
+use std::rc::Rc;
 use std::sync::Arc;
 
 use glam::DVec3;
@@ -11,7 +13,7 @@ use insonify::sim::{Simulator, Tracer, layout, placement, shaders::Library, tabl
 use insonify_tools::reference::{Accumulator, Owned, Segment};
 use insonify_tools::reference::{axial, beam, detect, display, scatter};
 
-use crate::physics::check::Picture;
+use crate::physics::check::{Memo, Picture};
 
 /// A scene in the form that the kernels read.
 pub struct Inputs(Owned);
@@ -125,15 +127,30 @@ pub fn twin_of(scene: &Scene, change: impl Fn(&mut Segment)) -> Frame {
 }
 
 /// A renderer of frames, with its name.
-pub type Renderer = (&'static str, Box<dyn Fn(&Scene) -> Frame>);
+pub type Renderer = (&'static str, Box<dyn Fn(&Scene) -> Rc<Frame>>);
 
-/// The twins, and the device with each of the tracers.
-pub fn renderers(device: &Arc<gpu::Device>, tracers: &[Tracer]) -> Vec<Renderer> {
-    let mut all: Vec<Renderer> = vec![("twins", Box::new(twin))];
+/// Most samples of the frames that one renderer keeps: 200 MB.
+const KEPT: usize = 1 << 23;
+
+/// The twins, and the device with each of the tracers. The first frames of each are kept for when they are asked for again.
+pub fn renderers(device: &Arc<gpu::Device>, tracers: &[Tracer], memo: &Memo) -> Vec<Renderer> {
+    let kept = |name: &'static str, make: Box<dyn Fn(&Scene) -> Frame>| -> Renderer {
+        let (memo, room) = (memo.clone(), Cell::new(KEPT));
+        let frame = move |scene: &Scene| {
+            let samples = (scene.probe.scanlines * scene.probe.samples) as usize;
+            let left = room.get().checked_sub(samples);
+            memo.once(&(name, scene), left.is_some(), || {
+                room.set(left.unwrap_or(room.get()));
+                make(scene)
+            })
+        };
+        (name, Box::new(frame))
+    };
+    let mut all = vec![kept("twins", Box::new(twin))];
     for &tracer in tracers {
         let device = device.clone();
         let name = if tracer == Tracer::Bvh { "bvh" } else { "query" };
-        all.push((name, Box::new(move |s| on(&device, s, tracer))));
+        all.push(kept(name, Box::new(move |s| on(&device, s, tracer))));
     }
     all
 }

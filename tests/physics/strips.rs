@@ -1,5 +1,7 @@
 //! Strips of scanlines behind surfaces that part their paths or bring them together.
 
+use std::rc::Rc;
+
 use glam::{DAffine3, DVec2, DVec3};
 use insonify::scene::Scene;
 use insonify::settings::{Loss, Refraction};
@@ -68,15 +70,15 @@ fn counted() -> Vec<(usize, f64)> {
 }
 
 /// The image of the device; of the twins where strips are planted.
-fn shown(bench: &Bench, physics: Physics, scene: &Scene) -> Frame {
+fn shown(bench: &Bench, physics: Physics, scene: &Scene) -> Rc<Frame> {
     match physics {
         Physics::Right => (bench.renderers[1].1)(scene),
-        Physics::Planted => twin_of(scene, |s: &mut Segment| s.strip = [PITCH, 0.0]),
+        Physics::Planted => Rc::new(twin_of(scene, |s: &mut Segment| s.strip = [PITCH, 0.0])),
     }
 }
 
 /// Mean power of each scanline that counts, between two depths that go by its place, over images of all seeds.
-fn powers(frames: &[Frame], depths: impl Fn(f64) -> [f64; 2]) -> Vec<f64> {
+fn powers(frames: &[Rc<Frame>], depths: impl Fn(f64) -> [f64; 2]) -> Vec<f64> {
     let pitch = free(0).probe.sample_pitch();
     let of = |(l, place): (usize, f64)| {
         let [from, to] = depths(place).map(|z| (z / pitch) as usize);
@@ -87,7 +89,7 @@ fn powers(frames: &[Frame], depths: impl Fn(f64) -> [f64; 2]) -> Vec<f64> {
 }
 
 /// Images without a body, by the device.
-fn free_images(bench: &Bench) -> Vec<Frame> {
+fn free_images(bench: &Bench) -> Vec<Rc<Frame>> {
     (0..SEEDS).map(|seed| shown(bench, Physics::Right, &free(seed))).collect()
 }
 
@@ -99,7 +101,7 @@ fn parted(segment: &Segment, physics: Physics, x: f64) -> f64 {
     }
 }
 
-fn slab(bench: &Bench, physics: Physics, whole: &[Frame], out: &mut Outcome) {
+fn slab(bench: &Bench, physics: Physics, whole: &[Rc<Frame>], out: &mut Outcome) {
     let (incidence, speed) = (65f64.to_radians(), 1.450);
     let [entry, thickness] = SLAB;
     let scene = |seed: u32| {
@@ -154,7 +156,7 @@ fn tube_width(b: f64, speed: f64, x: f64) -> f64 {
     (apart.dot(DVec2::new(d.y, -d.x)) / (2.0 * step)).abs()
 }
 
-fn ball(bench: &Bench, physics: Physics, whole: &[Frame], speed: f64, out: &mut Outcome) {
+fn ball(bench: &Bench, physics: Physics, whole: &[Rc<Frame>], speed: f64, out: &mut Outcome) {
     let scene = |seed: u32| {
         let mut scene = free(seed);
         let centre = DVec3::new(0.0, 0.0, BALL[1]);

@@ -1,5 +1,7 @@
 //! Speckle behind a round vessel: what wave optics leave of it (`tools/oracle/vessel.json`).
 
+use std::rc::Rc;
+
 use glam::{DAffine3, DVec3};
 use insonify::scene::Scene;
 use serde_json::Value;
@@ -89,7 +91,7 @@ fn levels(bench: &Bench, physics: Physics) -> Outcome {
             let inside = places.iter().zip(&lines);
             let inside = inside.filter(|(place, _)| (within[0]..within[1]).contains(place));
             let expected = mean(&inside.map(|(_, levels)| levels[i]).collect::<Vec<_>>());
-            let of = |all: &[(Frame, Scene)]| {
+            let of = |all: &[(Rc<Frame>, Scene)]| {
                 mean(&all.iter().map(|(f, s)| power(f, s, within, *depth)).collect::<Vec<_>>())
             };
             let found = decibel(of(&behind)) - decibel(of(&whole));
