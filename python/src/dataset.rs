@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use insonify::dataset::{DatasetError, Plan, Run, Store, Told, colours};
-use insonify::issue::told;
+use insonify::dataset::{DatasetError, Event, Plan, Run, Store, colours};
+use insonify::issue::explanation;
 use insonify::sim::Tracer;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -13,8 +13,8 @@ use crate::simulator::{opened, tracer_of};
 
 fn failed(error: &DatasetError) -> PyErr {
     match error {
-        DatasetError::Scene(_) => SceneError::new_err(told(error)),
-        _ => InsonifyError::new_err(told(error)),
+        DatasetError::Scene(_) => SceneError::new_err(explanation(error)),
+        _ => InsonifyError::new_err(explanation(error)),
     }
 }
 
@@ -56,17 +56,17 @@ pub fn make_dataset<'py>(
         crate::process::enter()?;
         let made_and_told = py.detach(|| {
             let device = opened(device, wanted, false).map_err(|e| raised(&e))?;
-            let mut hear = |_: &Store<'_>, told: Told<'_>| {
-                match told {
-                    Told::Made(_) => made += 1,
-                    Told::Kept => kept += 1,
-                    Told::Part(_) => return Ok(()),
+            let mut hear = |_: &Store<'_>, event: Event<'_>| {
+                match event {
+                    Event::Made(_) => made += 1,
+                    Event::Kept => kept += 1,
+                    Event::Part(_) => return Ok(()),
                 }
-                let told = Python::attach(|py| {
+                let heard = Python::attach(|py| {
                     py.check_signals()?;
                     heard.call1(py, (made + kept, samples)).map(drop)
                 });
-                told.map_err(|error| {
+                heard.map_err(|error| {
                     raised_by = Some(error);
                     DatasetError::Stopped
                 })

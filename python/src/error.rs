@@ -2,7 +2,7 @@
 
 use std::fmt::Display;
 
-use insonify::issue::{Issue, told};
+use insonify::issue::{Issue, explanation};
 use insonify::scene::file;
 use pyo3::PyErr;
 use pyo3::create_exception;
@@ -28,7 +28,7 @@ pub fn raised(error: &impl Display) -> PyErr {
 
 /// The exception for a mistake in a scene.
 pub fn mistaken(error: &file::SceneError) -> PyErr {
-    SceneError::new_err(told(error))
+    SceneError::new_err(explanation(error))
 }
 
 /// The exception for a mesh with these findings.

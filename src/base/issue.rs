@@ -1,7 +1,7 @@
 //! Findings of checks on files, and mistakes that end the work: place, cause, and remedy.
 
+mod explanation;
 mod teller;
-mod told;
 
 use std::fmt;
 use std::io::Read as _;
@@ -10,8 +10,8 @@ use std::path::{Path, PathBuf};
 use miette::Diagnostic;
 use thiserror::Error;
 
+pub use explanation::explanation;
 pub use teller::tell_errors;
-pub use told::told;
 
 /// Severity of a finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

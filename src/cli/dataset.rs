@@ -7,7 +7,7 @@ use clap::Args;
 use miette::{IntoDiagnostic, Result, miette};
 
 use super::common::{self, Progress, TracerChoice};
-use insonify::dataset::{DatasetError, Made, Part, Plan, Run, Store, Told};
+use insonify::dataset::{DatasetError, Event, Made, Part, Plan, Run, Store};
 use insonify::gpu::{Device, DeviceOptions, cache_folder, peak_bytes};
 use insonify::output;
 use insonify::sim::Tracer;
@@ -62,7 +62,7 @@ pub fn run(args: &Dataset) -> Result<()> {
     let checked = run.check()?;
     let (parts, samples) = (run.parts(), run.samples());
     if args.check {
-        said(&plan, &parts, samples);
+        print_plan(&plan, &parts, samples);
         if checked < samples {
             output::line(format!(
                 "the draws of {checked} of them were checked, evenly among them; the rest when they are made"
@@ -98,7 +98,7 @@ pub fn run(args: &Dataset) -> Result<()> {
         TracerChoice::Bvh => Some(Tracer::Bvh),
     };
     let mut log = Log::new(samples);
-    let sheet = run.make(&device, wanted, &mut |store, told| log.told(store, told))?;
+    let sheet = run.make(&device, wanted, &mut |store, event| log.take(store, event))?;
     let rate = log.rate();
     log.progress.finish();
     output::line(format!(
@@ -141,8 +141,8 @@ fn held(folder: &Path) -> u64 {
     all.map(of).sum()
 }
 
-/// Says what a plan makes.
-fn said(plan: &Plan, parts: &[Part], samples: u32) {
+/// Prints what a plan makes.
+fn print_plan(plan: &Plan, parts: &[Part], samples: u32) {
     for split in &plan.splits {
         output::line(format!("{}: {} samples", split.name, split.samples.len()));
     }
@@ -176,14 +176,14 @@ impl Log {
         f64::from(self.made) / hours.max(1e-9)
     }
 
-    fn told(&mut self, store: &Store<'_>, told: Told<'_>) -> Result<(), DatasetError> {
-        match told {
-            Told::Made(made) => {
+    fn take(&mut self, store: &Store<'_>, event: Event<'_>) -> Result<(), DatasetError> {
+        match event {
+            Event::Made(made) => {
                 self.made += 1;
                 self.losses(store, made);
             }
-            Told::Kept => self.kept += 1,
-            Told::Part(part) => {
+            Event::Kept => self.kept += 1,
+            Event::Part(part) => {
                 let count = part.samples.len();
                 output::line(format!(
                     "{}: {count} samples, {:.0} an hour",

@@ -86,14 +86,14 @@ pub fn run(args: &Match) -> Result<()> {
             size: fits(Fitted::Size),
         },
     };
-    let told = |round: usize, imaging: &Imaging| {
+    let progress = |round: usize, imaging: &Imaging| {
         let [axial, lateral, _] = imaging.psf_scale;
         output::note(format!(
             "round {round}: gain {:.1} dB, dynamic range {:.1} dB, psf_scale {axial} {lateral}",
             imaging.gain, imaging.dynamic_range
         ));
     };
-    let made = matching::fit(&mut simulator, &mut scene, &options, told);
+    let made = matching::fit(&mut simulator, &mut scene, &options, progress);
     let made = made.map_err(|error| match error {
         MatchError::Nothing { cause, remedy } => {
             miette!(help = remedy, "{} cannot be matched: {cause}", args.scene.display())

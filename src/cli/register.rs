@@ -15,7 +15,7 @@ use miette::{Result, miette};
 use super::common::{self, notes, seconds, writable};
 
 mod inputs;
-mod told;
+mod report;
 
 /// Arguments of `insonify register`.
 #[derive(Debug, Args)]
@@ -125,18 +125,18 @@ pub fn run(args: &Register) -> Result<()> {
     let mut warnings = Vec::new();
     let made = search(args, &scene, &volume, &mut warnings);
     // The warnings may explain why there is no result.
-    let made = made.inspect_err(|_| told::warn(&warnings))?;
+    let made = made.inspect_err(|_| report::warn(&warnings))?;
     let placement = Placement::of(&target.placed(&made.transform), args.transformation);
-    warnings.extend(told::doubts(&made));
-    told::print(&made);
-    told::warn(&warnings);
+    warnings.extend(report::doubts(&made));
+    report::print(&made);
+    report::warn(&warnings);
     let entries = placement.entries(&target.table);
     for (path, value) in entries.iter().filter_map(|(p, v)| Some((p, v.as_ref()?))) {
         output::line(format!("{path} = {value}"));
     }
     write(args, &entries, &target, &made)?;
     if let Some(file) = &args.json {
-        let report = told::json(&made, &target.table, &placement, &warnings);
+        let report = report::json(&made, &target.table, &placement, &warnings);
         common::write_json(file, &report)?;
     }
     Ok(())
@@ -176,7 +176,7 @@ fn search(
                 start = DAffine3::from_translation(surface.centre() - middle);
             }
             let fit = icp::fit(points, &surface, start, transformation)?;
-            warnings.extend(told::apart(&fit, surface.size()));
+            warnings.extend(report::apart(&fit, surface.size()));
             Some(fit)
         }
         None => None,
@@ -256,7 +256,7 @@ fn write(args: &Register, entries: &[Entry], target: &Target, made: &Registered)
             return Ok(());
         }
     };
-    let note = (format!("{}.translate", target.table), told::note(made, &inputs::names(args)));
+    let note = (format!("{}.translate", target.table), report::note(made, &inputs::names(args)));
     save_with(&args.scene, output, entries, &[note])?;
     output::line(output.display());
     Ok(())

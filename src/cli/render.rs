@@ -108,9 +108,9 @@ pub fn run(args: &Render) -> Result<()> {
     let Stage { device, tracer, mut simulator, upload_ms: build_ms } =
         args.common.stage(&mut scene, &library)?;
 
-    let said = said(args, &output, &scene, &of_file, &device, tracer)?;
-    let (timings, said) =
-        simulate(&mut simulator, &mut library, &mut scene, args, &output, moments, said)?;
+    let sidecar = sidecar(args, &output, &scene, &of_file, &device, tracer)?;
+    let (timings, sidecar) =
+        simulate(&mut simulator, &mut library, &mut scene, args, &output, moments, sidecar)?;
     if let Some(dir) = &args.dump {
         dump::frame(&mut simulator, &scene, dir).into_diagnostic()?;
     }
@@ -136,7 +136,7 @@ pub fn run(args: &Render) -> Result<()> {
     let messages = device.validation_messages();
     if let Some(file) = &args.json {
         let memory = device.memory();
-        let mut report = said;
+        let mut report = sidecar;
         let figures = json!({
             "triangles": scene.triangles(),
             "fps": args.fps,
@@ -184,7 +184,7 @@ fn distinct(args: &Render, output: &Path) -> Result<()> {
 
 /// What is said of all frames beside the pictures and in them. Under `set` stands what of the scene file to replace to
 /// get them again.
-fn said(
+fn sidecar(
     args: &Render,
     output: &Path,
     scene: &Scene,
@@ -196,7 +196,7 @@ fn said(
     let set = args.common.overrides(&args.scene)?.into_iter();
     let set = set.map(|(path, value)| (path, Some(value))).chain(settled);
     let set: Map<String, Value> = set.map(|(path, value)| (path, value.into())).collect();
-    let said = json!({
+    let sidecar = json!({
         "program": concat!("insonify ", env!("CARGO_PKG_VERSION")),
         "scene": scene.name,
         "scene_file": shipped::cited(&args.scene, output.parent().unwrap_or(output)),
@@ -206,7 +206,7 @@ fn said(
         "set": set,
         "settings": facts::settings(scene),
     });
-    Ok(said.as_object().expect("made as one").clone())
+    Ok(sidecar.as_object().expect("made as one").clone())
 }
 
 /// Scatterers per resolution cell over depth, of the tissue with most; none in voxel mode.
@@ -287,11 +287,11 @@ fn simulate(
     args: &Render,
     output: &Path,
     moments: Vec<Moment>,
-    said: Map<String, Value>,
+    sidecar: Map<String, Value>,
 ) -> Result<(Vec<FrameTimings>, Map<String, Value>)> {
     let frames = moments.len() as u32;
     let shown = args.fps.or_else(|| pace(args, &moments)).unwrap_or(SHOWN);
-    let mut film = Film::new(output, simulator, scene, &moments, shown, said)?;
+    let mut film = Film::new(output, simulator, scene, &moments, shown, sidecar)?;
     let labels = args.labels.as_ref().map(|path| LabelFiles::new(path, frames)).transpose()?;
     let mut progress = Progress::new(frames, "frames");
     let mut timings = Vec::new();
@@ -325,11 +325,11 @@ fn simulate(
         output::note(format!("warning: {}", common::unseen(scene, mask)));
     }
     progress.finish();
-    let said = film.finish(output, args.json.as_deref())?;
+    let sidecar = film.finish(output, args.json.as_deref())?;
     if let Some(labels) = labels {
         labels.finish();
     }
-    Ok((timings, said))
+    Ok((timings, sidecar))
 }
 
 fn default_output(scene: &Path) -> PathBuf {

@@ -23,7 +23,7 @@ use session::Session;
 /// Pause where nothing has changed: a tracker sends 30 to 100 poses a second.
 const REST: Duration = Duration::from_millis(3);
 /// Time between reports about clients and errors.
-const TOLD: Duration = Duration::from_secs(1);
+const NOTICE_PERIOD: Duration = Duration::from_secs(1);
 
 /// Arguments of `insonify serve`.
 #[derive(Debug, clap::Args)]
@@ -77,13 +77,13 @@ struct Shown {
 /// finer ones once they rest; offers them to the clients, and carries out what they order.
 fn simulate(session: &mut Session, server: &Server, args: &Serve) -> Result<()> {
     let pause = Duration::from_secs_f64(1.0 / args.fps);
-    let mut told = Told::default();
+    let mut notices = Notices::default();
     let mut pace = Pace::new(sim::machine(&session.device));
     let mut shown: Option<Shown> = None;
     let mut frames = 0;
     let mut due = Instant::now();
     loop {
-        told.tell(server);
+        notices.update(server);
         while let Some(request) = server.request() {
             let outcome = session.carry_out(&request.order, server);
             if outcome.is_ok() && !matches!(request.order, Order::Get(_)) {
@@ -149,7 +149,7 @@ fn state(scene: &Scene) -> (DAffine3, Vec<Placed>) {
 
 /// Reports already made to the user.
 #[derive(Default)]
-struct Told {
+struct Notices {
     tracker: String,
     /// Reason for which nothing moves the probe; empty without one.
     silence: String,
@@ -157,9 +157,9 @@ struct Told {
     at: Option<Instant>,
 }
 
-impl Told {
+impl Notices {
     /// Reports news of the tracker at once, of clients and errors once a second.
-    fn tell(&mut self, server: &Server) {
+    fn update(&mut self, server: &Server) {
         let tracker = match server.pose() {
             TrackerState::Never => String::new(),
             TrackerState::Live(pose) => format!("tracker: {} moves the probe", pose.device),
@@ -171,7 +171,7 @@ impl Told {
             output::note(&tracker);
             self.tracker = tracker;
         }
-        if self.at.is_some_and(|at| at.elapsed() < TOLD) {
+        if self.at.is_some_and(|at| at.elapsed() < NOTICE_PERIOD) {
             return;
         }
         self.at = Some(Instant::now());

@@ -80,7 +80,7 @@ pub(crate) struct Instance {
     /// Sentences about drivers of the machine that the loader could not load.
     pub(crate) driver_faults: Vec<String>,
     /// The log into which the loader writes that, also while the instance is destroyed.
-    _told: ValidationLog,
+    _log: ValidationLog,
     /// Holds the loader's library open; dropped last.
     pub(crate) entry: ash::Entry,
 }
@@ -175,12 +175,12 @@ impl Instance {
             info = info.push_next(&mut features);
         }
         // The loader tells of drivers while it makes the instance, and only then.
-        let told = ValidationLog::default();
+        let log = ValidationLog::default();
         let mut listening = vk::DebugUtilsMessengerCreateInfoEXT::default()
             .message_severity(vk::DebugUtilsMessageSeverityFlagsEXT::ERROR)
             .message_type(vk::DebugUtilsMessageTypeFlagsEXT::GENERAL)
             .pfn_user_callback(Some(on_message))
-            .user_data(Arc::as_ptr(&told.0).cast_mut().cast());
+            .user_data(Arc::as_ptr(&log.0).cast_mut().cast());
         if debug_utils {
             info = info.push_next(&mut listening);
         }
@@ -189,7 +189,7 @@ impl Instance {
         // lives as long as the instance, which holds it.
         let made = unsafe { entry.create_instance(&info, None) };
         drop(changing);
-        let driver_faults = driver_faults(&told.take());
+        let driver_faults = driver_faults(&log.take());
         let raw = made.map_err(|code| match code {
             // The loader's word for a machine without a single driver that answers.
             vk::Result::ERROR_INCOMPATIBLE_DRIVER => GpuError::no_device(&driver_faults),
@@ -203,7 +203,7 @@ impl Instance {
             log: ValidationLog::default(),
             messenger: None,
             driver_faults,
-            _told: told,
+            _log: log,
             entry,
         };
         if validate {

@@ -71,7 +71,7 @@ pub(crate) struct PipelineStore {
     /// them.
     known: Mutex<BTreeSet<u64>>,
     /// True once the user has been told the reason for the wait.
-    told: Arc<AtomicBool>,
+    announced: Arc<AtomicBool>,
 }
 
 impl PipelineStore {
@@ -110,7 +110,7 @@ impl PipelineStore {
             properties: *properties,
             file,
             known: Mutex::new(known),
-            told: Arc::default(),
+            announced: Arc::default(),
         })
     }
 
@@ -137,14 +137,14 @@ impl PipelineStore {
     /// and one of `kernels` is new here.
     pub(crate) fn patience(&self, kernels: impl IntoIterator<Item = u64>) -> Option<WaitNotice> {
         let new = kernels.into_iter().any(|kernel| self.is_new(kernel));
-        if !new || self.told.load(Ordering::Relaxed) {
+        if !new || self.announced.load(Ordering::Relaxed) {
             return None;
         }
         let (done, wait) = mpsc::channel::<()>();
-        let (device, told) = (self.device.clone(), self.told.clone());
+        let (device, announced) = (self.device.clone(), self.announced.clone());
         thread::spawn(move || {
             let late = wait.recv_timeout(PATIENCE) == Err(RecvTimeoutError::Timeout);
-            if late && !told.swap(true, Ordering::Relaxed) {
+            if late && !announced.swap(true, Ordering::Relaxed) {
                 insonify_base::output::note(format!(
                     "compiling kernels for {device}, the first time only"
                 ));

@@ -33,7 +33,7 @@ pub use members::colours;
 pub use plan::{Array, Format, Part, Plan, Sample, Segmented, Split};
 pub use run::{MOST_CHECKED, Run};
 pub use sheet::Gallery;
-pub use store::{Store, Told};
+pub use store::{Event, Store};
 pub use studio::{Made, Studio};
 
 /// The reason why a sample was not made or written.

@@ -135,10 +135,10 @@ pub fn fit(
     simulator: &mut Simulator,
     scene: &mut Scene,
     options: &Options,
-    mut told: impl FnMut(usize, &Imaging),
+    mut progress: impl FnMut(usize, &Imaging),
 ) -> Result<Matching, MatchError> {
     let start = (scene.imaging.clone(), scene.simulation.clone(), scene.fusion.clone());
-    let result = settle(simulator, scene, options, &mut told);
+    let result = settle(simulator, scene, options, &mut progress);
     (scene.simulation, scene.fusion) = (start.1, start.2);
     if result.is_err() {
         scene.imaging = start.0;
@@ -150,7 +150,7 @@ fn settle(
     simulator: &mut Simulator,
     scene: &mut Scene,
     options: &Options,
-    told: &mut dyn FnMut(usize, &Imaging),
+    progress: &mut dyn FnMut(usize, &Imaging),
 ) -> Result<Matching, MatchError> {
     if !scene.shows_volume() {
         return Err(nothing(
@@ -158,7 +158,7 @@ fn settle(
             "add [volume], and [fusion] with surroundings = \"volume\"",
         ));
     }
-    told(0, &scene.imaging);
+    progress(0, &scene.imaging);
     simulator.frame(scene, 0)?;
     let mut band = band(simulator, scene, options.band)?;
     let volume = background(simulator, scene)?;
@@ -214,7 +214,7 @@ fn settle(
             true => imaging,
             false => halfway(&stage.imaging, &imaging),
         };
-        told(rounds, &scene.imaging);
+        progress(rounds, &scene.imaging);
         stage = simulate(simulator, scene, &band, options)?;
     }
 }

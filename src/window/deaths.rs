@@ -30,7 +30,7 @@ pub(super) struct Death {
     /// Name of the thread.
     pub(super) thread: String,
     /// Its panic's message, with the place in the source.
-    pub(super) said: String,
+    pub(super) message: String,
 }
 
 impl Death {
@@ -81,8 +81,8 @@ impl Deaths {
         }));
     }
 
-    fn add(&self, thread: &str, said: &str) {
-        let death = Death { thread: thread.to_owned(), said: said.to_owned() };
+    fn add(&self, thread: &str, message: &str) {
+        let death = Death { thread: thread.to_owned(), message: message.to_owned() };
         let mut deaths = self.0.lock();
         if deaths.len() < KEPT && !deaths.contains(&death) {
             deaths.push(death);
@@ -102,7 +102,7 @@ impl Deaths {
         let mut text = format!("insonify {} on {device}\n", env!("CARGO_PKG_VERSION"));
         text += &format!("scene: {}\n", model.file.path.display());
         for death in self.0.lock().iter() {
-            text += &format!("thread '{}' died: {}\n", death.thread, death.said);
+            text += &format!("thread '{}' died: {}\n", death.thread, death.message);
         }
         text
     }
@@ -110,10 +110,10 @@ impl Deaths {
 
 /// A panic's message after its place: "src/a.rs:12:5: index out of bounds".
 fn last_words(info: &PanicHookInfo) -> String {
-    let said = info.payload_as_str().unwrap_or("no words");
+    let message = info.payload_as_str().unwrap_or("no words");
     match info.location() {
-        Some(place) => format!("{place}: {said}"),
-        None => said.to_owned(),
+        Some(place) => format!("{place}: {message}"),
+        None => message.to_owned(),
     }
 }
 
@@ -141,9 +141,11 @@ mod tests {
         let noted = deaths.0.lock().clone();
         let own: Vec<_> = noted.iter().filter(|d| d.thread == "deaths' own").collect();
         assert_eq!(own.len(), 1, "{noted:?}");
-        assert!(own[0].said.contains("deaths.rs:") && own[0].said.ends_with(": a planted bug"));
+        assert!(
+            own[0].message.contains("deaths.rs:") && own[0].message.ends_with(": a planted bug")
+        );
         assert!(woken.load(Ordering::Relaxed) >= 2);
-        assert!(noted.iter().all(|death| death.said != "here"));
+        assert!(noted.iter().all(|death| death.message != "here"));
     }
 
     #[test]
@@ -164,7 +166,9 @@ mod tests {
     fn every_death_has_a_remedy_of_its_own() {
         let names = [SIMULATION, OPENING, CAPTURE, PADS, "igtl sender", "pipelines 3"];
         let of = |stopped| {
-            names.map(|name| Death { thread: name.to_owned(), said: String::new() }.remedy(stopped))
+            names.map(|name| {
+                Death { thread: name.to_owned(), message: String::new() }.remedy(stopped)
+            })
         };
         let all: std::collections::BTreeSet<_> = of(false).into_iter().chain(of(true)).collect();
         assert_eq!(all.len(), names.len() + 1);

@@ -46,7 +46,7 @@ impl Files {
     pub(super) fn save(&mut self, model: &mut Model) {
         if let Err(error) = model.save(None, self.with_pose) {
             self.ask(Purpose::Save, model);
-            let shown = self.refuse(said(&error));
+            let shown = self.refuse(message_of(&error));
             shown.expect("just asked");
         }
     }
@@ -69,7 +69,7 @@ impl Files {
 }
 
 /// The text of an error: place, cause and remedy.
-pub(super) fn said(error: &SceneError) -> String {
+pub(super) fn message_of(error: &SceneError) -> String {
     let remedy = error.remedy.as_deref().map(|r| format!("\n{r}"));
     format!("{error}{}", remedy.unwrap_or_default())
 }

@@ -4,7 +4,7 @@ use std::net::{IpAddr, SocketAddr};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use super::files::said;
+use super::files::message_of;
 use super::link::{Bell, Link, Report};
 use super::model::{Model, StoredTrajectory, TrajectoryState, age};
 use super::pads::{Pads, Word};
@@ -171,7 +171,7 @@ impl Inputs {
                 model.keep_trajectory(StoredTrajectory::loaded(track, name(path)), now);
                 None
             }
-            Err(error) => Some(said(&error)),
+            Err(error) => Some(message_of(&error)),
         };
     }
 

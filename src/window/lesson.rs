@@ -263,7 +263,7 @@ fn before(ui: &mut Ui, model: &mut Model, lesson: &mut Lesson, now: Instant) {
     }
     if let Some(attempt) = &lesson.result {
         ui.separator();
-        told(ui, &attempt.score);
+        show_score(ui, &attempt.score);
         if let Goal::Question(question) = &model.tasks[lesson.chosen].goal {
             ui.label(&question.explanation);
         }
@@ -271,7 +271,7 @@ fn before(ui: &mut Ui, model: &mut Model, lesson: &mut Lesson, now: Instant) {
 }
 
 /// A score: whether the task is reached, why not, and the numbers.
-fn told(ui: &mut Ui, score: &Score) {
+fn show_score(ui: &mut Ui, score: &Score) {
     let (word, colour) = match score.reached {
         true => ("Reached", GHOST),
         false => ("Not reached", style::WARN),

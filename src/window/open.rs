@@ -43,7 +43,7 @@ pub(super) struct Open {
     model: Model,
     state: State,
     /// Revision of the model that the simulation has received.
-    told: u64,
+    ordered: u64,
     /// View of the anatomy that the simulation has received.
     look: Option<Look>,
     /// True until the picture has been on the screen.
@@ -194,8 +194,8 @@ impl Open {
     /// Sends the changes to the simulation.
     fn tell(&mut self) {
         // A scene to be adopted has settings of its own.
-        if self.model.revision() != self.told && self.coming.is_none() {
-            self.told = self.model.revision();
+        if self.model.revision() != self.ordered && self.coming.is_none() {
+            self.ordered = self.model.revision();
             let (order, frozen) = (self.model.order(), self.model.frozen);
             self.session.engine.order(order, frozen);
             self.awaited = !frozen;

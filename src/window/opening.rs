@@ -89,7 +89,7 @@ impl Opening {
                 let opened = |opened| Opened { warnings, again, ..opened };
                 suited.map(opened).map_err(|e| e.to_string())
             }
-            Err(error) => Err(super::files::said(&error)),
+            Err(error) => Err(super::files::message_of(&error)),
         })
     }
 

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::time::Instant;
 
-use super::files::said;
+use super::files::message_of;
 use super::model::Model;
 use crate::igtl::{Order, Reach};
 use crate::scene::file::{facts, put_settings, value_of_settings};
@@ -21,7 +21,7 @@ pub(super) fn carry_out(
     match order {
         Order::Set(pairs) => {
             let before = model.settings.clone();
-            put_settings(pairs, &mut model.settings).map_err(|error| said(&error))?;
+            put_settings(pairs, &mut model.settings).map_err(|error| message_of(&error))?;
             model.note(&before, now);
             let told = pairs.iter().map(|(path, value)| format!("{path} = {value}"));
             Ok(told.collect::<Vec<_>>().join("\n"))

@@ -5,7 +5,7 @@ use std::io::{IsTerminal, stderr};
 
 use miette::{Diagnostic, ReportHandler};
 
-use super::told;
+use super::explanation;
 
 /// Makes an error that ends this program appear as cause and remedy, with `error:` before it. To be called once, when
 /// the program begins.
@@ -22,6 +22,6 @@ struct Teller {
 impl ReportHandler for Teller {
     fn debug(&self, error: &dyn Diagnostic, f: &mut Formatter<'_>) -> Result {
         let title = if self.red { "\x1b[1;31merror\x1b[0m" } else { "error" };
-        write!(f, "{title}: {}", told(error))
+        write!(f, "{title}: {}", explanation(error))
     }
 }

@@ -22,7 +22,7 @@ pub fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
 ///
 /// # Errors
 /// Errors of the file system; a file that was there is then unchanged.
-pub fn write_sidecar(path: &Path, said: &Map<String, Value>) -> Result<()> {
+pub fn write_sidecar(path: &Path, sidecar: &Map<String, Value>) -> Result<()> {
     if !files::is_stream(path) && path.exists() && !is_ours(path) {
         output::note(format!(
             "warning: {0} is there and is not of this program: it is kept, and what is said of the pictures is not written; \
@@ -31,14 +31,14 @@ pub fn write_sidecar(path: &Path, said: &Map<String, Value>) -> Result<()> {
         ));
         return Ok(());
     }
-    write_json(path, said)
+    write_json(path, sidecar)
 }
 
 /// True for a file that says which of these programs made it.
 fn is_ours(path: &Path) -> bool {
-    let said = std::fs::read(path).ok();
-    let said = said.and_then(|bytes| serde_json::from_slice::<Value>(&bytes).ok());
-    let program = said.as_ref().and_then(|said| said.get("program")?.as_str());
+    let sidecar = std::fs::read(path).ok();
+    let sidecar = sidecar.and_then(|bytes| serde_json::from_slice::<Value>(&bytes).ok());
+    let program = sidecar.as_ref().and_then(|sidecar| sidecar.get("program")?.as_str());
     program.is_some_and(|program| program.starts_with("insonify "))
 }
 

@@ -34,7 +34,7 @@ pub struct Film {
     ras_from_world: DAffine3,
     reel: Reel,
     /// Text beside the pictures and in them: what was imaged, and how.
-    said: Map<String, Value>,
+    sidecar: Map<String, Value>,
     /// What is said of each frame: file, time, pose.
     frames: Vec<Value>,
 }
@@ -101,7 +101,7 @@ impl Film {
         scene: &Scene,
         moments: &[Moment],
         shown: f64,
-        said: Map<String, Value>,
+        sidecar: Map<String, Value>,
     ) -> Result<Self> {
         let reel = if Movie::is_meant(output) {
             Reel::Movie(Movie::new(output).into_diagnostic()?)
@@ -130,7 +130,7 @@ impl Film {
         });
         let ras_from_world = scene.tracker.axes.to_ras();
         let times = times.collect();
-        Ok(Self { shown, times, ras_from_world, reel, said, frames: Vec::new() })
+        Ok(Self { shown, times, ras_from_world, reel, sidecar, frames: Vec::new() })
     }
 
     /// Adds the last frame of the simulator, the one of this number.
@@ -141,7 +141,7 @@ impl Film {
         let (width, height, rgba) = simulator.pixels().into_diagnostic()?;
         let area = area(simulator);
         if index == 0 {
-            self.said.insert("image".into(), facts::image(&area));
+            self.sidecar.insert("image".into(), facts::image(&area));
         }
         let mut frame = Map::new();
         if let Reel::Images(images) = &self.reel {
@@ -151,7 +151,7 @@ impl Film {
         frame.insert("pose".into(), facts::pose(&scene.world_from_probe));
         match &mut self.reel {
             Reel::Images(images) => {
-                let mut text = self.said.clone();
+                let mut text = self.sidecar.clone();
                 text.extend(frame.clone());
                 let text = Value::Object(text).to_string();
                 let picture = grey_png([width, height], &rgba, area.pitch, Some(&text));
@@ -209,38 +209,38 @@ impl Film {
             Reel::Movie(movie) => {
                 movie.finish().into_diagnostic()?;
                 output::line(output.display());
-                self.said.insert("file".into(), name(output));
+                self.sidecar.insert("file".into(), name(output));
                 sidecar = Some(output.with_extension("json"));
             }
             Reel::Mp4(film) => {
                 film.finish().into_diagnostic()?;
                 output::line(output.display());
-                self.said.insert("file".into(), name(output));
+                self.sidecar.insert("file".into(), name(output));
                 sidecar = Some(output.with_extension("json"));
             }
             Reel::Dicom(film) => {
                 film.finish(1e3 / self.shown).into_diagnostic()?;
                 output::line(output.display());
-                self.said.insert("file".into(), name(output));
+                self.sidecar.insert("file".into(), name(output));
             }
             Reel::Sequence(recording) => {
                 recording.finish().write(output)?;
                 output::line(output.display());
-                self.said.insert("file".into(), name(output));
+                self.sidecar.insert("file".into(), name(output));
             }
             Reel::Exchange(frames, format) => {
                 files::replace(output, &frames.bytes(format))
                     .map_err(|e| miette!("writing {}: {e}", output.display()))?;
                 output::line(output.display());
-                self.said.insert("file".into(), name(output));
+                self.sidecar.insert("file".into(), name(output));
             }
         }
-        self.said.insert("frames".into(), self.frames.into());
+        self.sidecar.insert("frames".into(), self.frames.into());
         let beside = |path: &PathBuf| elsewhere != Some(path) && !files::is_stream(output);
         if let Some(path) = sidecar.filter(beside) {
-            common::write_sidecar(&path, &self.said)?;
+            common::write_sidecar(&path, &self.sidecar)?;
         }
-        Ok(self.said)
+        Ok(self.sidecar)
     }
 }
 

@@ -100,7 +100,7 @@ impl<'a> Session<'a> {
             }
             Order::Scene(name) => {
                 let path = self.reach.scene(name)?;
-                let file = SceneFile::read(&path).map_err(said)?;
+                let file = SceneFile::read(&path).map_err(message_of)?;
                 self.open(&path, Vec::new(), server)?;
                 (self.path, self.file) = (path, file);
                 self.clock = (Instant::now(), 0.0);
@@ -117,8 +117,8 @@ impl<'a> Session<'a> {
             entries.retain(|(known, _)| known != path);
             entries.push((path.clone(), value.clone()));
         }
-        let told = pairs.iter().map(|(path, value)| format!("{path} = {value}"));
-        let told = told.collect::<Vec<_>>().join("\n");
+        let answer = pairs.iter().map(|(path, value)| format!("{path} = {value}"));
+        let answer = answer.collect::<Vec<_>>().join("\n");
         let moves = pairs.iter().any(|(path, _)| path.starts_with("probe.pose"));
         if !pairs.iter().all(|(path, _)| SceneFile::is_light(path)) {
             let pose = self.scene.world_from_probe;
@@ -127,10 +127,10 @@ impl<'a> Session<'a> {
             if !moves {
                 self.scene.world_from_probe = pose;
             }
-            return Ok(told);
+            return Ok(answer);
         }
         let mut scene = self.scene.clone();
-        self.file.put(&self.all(&self.path, &entries), &mut scene).map_err(said)?;
+        self.file.put(&self.all(&self.path, &entries), &mut scene).map_err(message_of)?;
         if !moves {
             scene.world_from_probe = self.scene.world_from_probe;
         }
@@ -140,14 +140,16 @@ impl<'a> Session<'a> {
         }
         self.simulator.fit(&scene).map_err(|error| error.to_string())?;
         (self.scene, self.entries) = (scene, entries);
-        Ok(told)
+        Ok(answer)
     }
 
     fn get(&self, path: &str) -> Result<String, String> {
         let facts = file::facts(path)?;
         let text = match file::value(&self.scene, path) {
             Some(value) => facts.text(&value),
-            None => self.file.stated(&self.all(&self.path, &self.entries), path).map_err(said)?,
+            None => {
+                self.file.stated(&self.all(&self.path, &self.entries), path).map_err(message_of)?
+            }
         };
         let text = text.ok_or_else(|| format!("`{path}` is not set in {}", self.path.display()))?;
         Ok(format!("{path} = {text}"))
@@ -164,7 +166,8 @@ impl<'a> Session<'a> {
     /// Loads the scene again, or another one, with entries.
     fn open(&mut self, path: &Path, entries: Entries, server: &Server) -> Result<(), String> {
         let common = &self.args.common;
-        let (mut scene, warnings) = Scene::load(path, &self.all(path, &entries)).map_err(said)?;
+        let (mut scene, warnings) =
+            Scene::load(path, &self.all(path, &entries)).map_err(message_of)?;
         common::notes(&warnings);
         common.settle(&mut scene, &self.device);
         let simulator = common.tracer(&self.device, &scene).and_then(|tracer| {
@@ -178,7 +181,7 @@ impl<'a> Session<'a> {
 }
 
 /// The text of an error, with its remedy.
-fn said(error: SceneError) -> String {
+fn message_of(error: SceneError) -> String {
     match &error.remedy {
         Some(remedy) => format!("{error}; {remedy}"),
         None => error.to_string(),

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use serde_json::json;
 
-use super::{DatasetError, Gallery, Part, Plan, Store, Studio, Told};
+use super::{DatasetError, Event, Gallery, Part, Plan, Store, Studio};
 use crate::gpu::Device;
 use crate::sim::Tracer;
 
@@ -56,7 +56,7 @@ impl Run<'_> {
         Ok(all.div_ceil(step as u32))
     }
 
-    /// Makes the shard and its contact sheet; `told` hears of each sample and part, and may end the run by an error.
+    /// Makes the shard and its contact sheet; `progress` hears of each sample and part, and may end the run by an error.
     /// `wanted` is the tracer, none the device's best. Returns the sheet.
     ///
     /// # Errors
@@ -65,7 +65,7 @@ impl Run<'_> {
         &self,
         device: &Arc<Device>,
         wanted: Option<Tracer>,
-        told: &mut dyn FnMut(&Store<'_>, Told<'_>) -> Result<(), DatasetError>,
+        progress: &mut dyn FnMut(&Store<'_>, Event<'_>) -> Result<(), DatasetError>,
     ) -> Result<PathBuf, DatasetError> {
         let parts = self.parts();
         let store = Store::new(self.plan, self.root);
@@ -75,10 +75,10 @@ impl Run<'_> {
         let mut studio = Studio::new(self.plan, device, wanted);
         let mut gallery = Gallery::new(self.plan, &parts);
         store.fill(&mut studio, &parts, &mut |news| {
-            if let Told::Made(made) = &news {
+            if let Event::Made(made) = &news {
                 gallery.take(made);
             }
-            told(&store, news)
+            progress(&store, news)
         })?;
         let sheet = match self.shard {
             [_, 1] => "sheet.png".to_owned(),

@@ -23,7 +23,7 @@ const PLAN: &str = "plan.toml";
 const DIGITS: usize = 6;
 
 /// Progress of [`Store::fill`].
-pub enum Told<'m> {
+pub enum Event<'m> {
     /// A sample was made.
     Made(&'m Made),
     /// A sample was there already.
@@ -235,7 +235,7 @@ impl<'p> Store<'p> {
         written.map_err(|e| DatasetError::writing(path, e))
     }
 
-    /// Makes what these parts lack. Of a part that is there, one sample is made again and compared. `told` hears of
+    /// Makes what these parts lack. Of a part that is there, one sample is made again and compared. `progress` hears of
     /// each sample and each part.
     ///
     /// # Errors
@@ -244,7 +244,7 @@ impl<'p> Store<'p> {
         &self,
         studio: &mut Studio<'_>,
         parts: &[Part],
-        told: &mut dyn FnMut(Told<'_>) -> Result<(), DatasetError>,
+        progress: &mut dyn FnMut(Event<'_>) -> Result<(), DatasetError>,
     ) -> Result<(), DatasetError> {
         // True once a sample of an earlier run has been made again.
         let mut compared = false;
@@ -260,7 +260,7 @@ impl<'p> Store<'p> {
                 let lacking: Vec<_> = self.own.iter().filter(own).collect();
                 let kept = archive.is_none() && lacking.is_empty();
                 if kept && compared {
-                    told(Told::Kept)?;
+                    progress(Event::Kept)?;
                     continue;
                 }
                 let made = studio.make(number)?;
@@ -277,12 +277,12 @@ impl<'p> Store<'p> {
                 for own in lacking {
                     self.write(&self.file(part, number, own), &self.bytes(own, &made, &files))?;
                 }
-                told(Told::Made(&made))?;
+                progress(Event::Made(&made))?;
             }
             if let Some(archive) = archive {
                 archive.finish().map_err(tarring)?;
             }
-            told(Told::Part(part))?;
+            progress(Event::Part(part))?;
         }
         Ok(())
     }

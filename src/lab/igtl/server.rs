@@ -103,7 +103,7 @@ pub(super) struct Shared {
     stopping: AtomicBool,
     /// True where the last published frame no longer shows the present scene.
     outdated: AtomicBool,
-    told: Box<dyn Fn() + Send + Sync>,
+    notify: Box<dyn Fn() + Send + Sync>,
 }
 
 impl Shared {
@@ -146,7 +146,7 @@ impl Shared {
 
     /// Reports that a pose has arrived, or that clients or errors have changed.
     pub fn tell(&self) {
-        (self.told)();
+        (self.notify)();
     }
 
     /// Changes the counts.
@@ -184,7 +184,7 @@ impl Server {
         Self::bind_and_tell(address, settings, || {})
     }
 
-    /// Like [`Server::bind`]; `told` is called, from threads of the server, whenever a pose or an order has arrived and when
+    /// Like [`Server::bind`]; `notify` is called, from threads of the server, whenever a pose or an order has arrived and when
     /// clients or errors have changed. It must not wait.
     ///
     /// # Errors
@@ -192,7 +192,7 @@ impl Server {
     pub fn bind_and_tell(
         address: SocketAddr,
         settings: ServerSettings,
-        told: impl Fn() + Send + Sync + 'static,
+        notify: impl Fn() + Send + Sync + 'static,
     ) -> Result<Self, IgtlError> {
         let fail = |cause| IgtlError::Bind { address, cause };
         let listener = TcpListener::bind(address).map_err(fail)?;
@@ -208,7 +208,7 @@ impl Server {
             status: Mutex::new(Status::default()),
             stopping: AtomicBool::new(false),
             outdated: AtomicBool::new(false),
-            told: Box::new(told),
+            notify: Box::new(notify),
         });
         let thread = {
             let shared = Arc::clone(&shared);

@@ -25,7 +25,7 @@ pub(crate) fn show(ctx: &egui::Context, model: &mut Model, state: &mut State) {
         );
         ScrollArea::vertical().max_height(HEIGHT).show(ui, |ui| {
             for death in &deaths {
-                let text = format!("The thread '{}' died: {}", death.thread, death.said);
+                let text = format!("The thread '{}' died: {}", death.thread, death.message);
                 ui.add(Label::new(RichText::new(text).color(style::WARN)).wrap());
                 ui.label(death.remedy(state.stopped));
             }

@@ -7,7 +7,7 @@ use egui::text::{CCursor, CCursorRange};
 use egui::text_edit::TextEditState;
 use egui::{Button, Key, RichText, ScrollArea, TextEdit, Ui};
 
-use super::{Files, Purpose, said};
+use super::{Files, Purpose, message_of};
 use crate::model::Model;
 use crate::recent;
 use crate::scene::SceneError;
@@ -172,7 +172,7 @@ fn contents(
     let is_done = match outcome {
         Some(Ok(())) => true,
         Some(Err(error)) => {
-            dialog.error = Some(said(&error));
+            dialog.error = Some(message_of(&error));
             false
         }
         None => false,

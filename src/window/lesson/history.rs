@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use dicom_core::chrono::{DateTime, Local};
 use egui::{Button, RichText, ScrollArea, TextStyle, Ui, vec2};
 
-use super::told;
+use super::show_score;
 use crate::style::{self, button};
 use crate::teach::history::{self, Entry};
 
@@ -115,7 +115,7 @@ pub(super) fn show(ui: &mut Ui, page: &mut Page, (scene, task): (&str, &str)) ->
     });
     ui.separator();
     let entry = &attempts[page.chosen];
-    told(ui, &entry.score);
+    show_score(ui, &entry.score);
     if entry.scene != scene {
         ui.label(format!("Its way is in another scene, {}.", entry.scene));
     } else if entry.way.is_empty() {

@@ -183,7 +183,7 @@ impl Open {
             frame: None,
             pictured: None,
             session,
-            told: model.revision(),
+            ordered: model.revision(),
             look: None,
             model,
             state,

@@ -103,7 +103,7 @@ impl Open {
         let Opened { scene, mut model, warnings, again } =
             opened.expect("nothing else was handed over");
         // Of the same session, what has happened meanwhile is still to be told.
-        self.told = if again { u64::MAX } else { model.revision() };
+        self.ordered = if again { u64::MAX } else { model.revision() };
         self.state.common.warnings = warnings;
         // Indices of the scene before.
         self.state.panels.console.forget_indices();

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use miette::{Diagnostic, SourceCode, SourceSpan};
 
 /// The text of an error, several lines: message, causes, lines of the file, remedy.
-pub fn told(error: &dyn Diagnostic) -> String {
+pub fn explanation(error: &dyn Diagnostic) -> String {
     let mut out = error.to_string();
     // The help and the place may be those of an error that others are about.
     let mut inner = error;
