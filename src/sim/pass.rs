@@ -75,7 +75,7 @@ impl Array {
         Self::new(name, element, size_of::<T>() / 4, entries)
     }
 
-    /// What each dispatch is given in a place of its own: a level of a pyramid, or an image.
+    /// An array that each dispatch is given as a buffer or image of its own: a level of a pyramid, the volume.
     pub const fn given(name: &'static str, element: Element, words: usize) -> Self {
         Self { name, element, words, entries: None, zeroed: false, within: None }
     }

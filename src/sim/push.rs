@@ -88,7 +88,7 @@ push! {
         /// 1: the mask has rows and columns exchanged.
         turned: u32,
     }
-    /// What tiles are sorted for.
+    /// Choice of the images that tiles are sorted for.
     "tiles" Tiles {
         /// 1: every intermediate image is wanted everywhere.
         complete: u32,

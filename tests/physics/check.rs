@@ -159,7 +159,7 @@ pub struct Bench {
     pub tracers: &'static [Tracer],
     /// The f64 twins, and the device with each of the tracers.
     pub renderers: Vec<Renderer>,
-    /// What both runs of a check share.
+    /// Results that both runs of a check share.
     pub memo: Memo,
 }
 

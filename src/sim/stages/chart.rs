@@ -7,7 +7,7 @@ use super::label::LABELS;
 use super::label::wanted;
 use crate::output::npy::Element::Word;
 
-/// What each pixel shows.
+/// Labels of the pixels: those of the samples that they show.
 pub const PIXEL_LABELS: Array = Array::of::<Label>("pixel_labels", Word, Sizes::pixels);
 
 /// The stage.

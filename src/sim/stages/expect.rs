@@ -22,7 +22,7 @@ pub const SURFACE_IQ: Array = Array::new("surface_iq", Float, 2, Sizes::samples)
 /// Baseband of the direct echoes of surfaces alone.
 pub const DIRECT_IQ: Array = Array::new("direct_iq", Float, 2, Sizes::samples);
 
-/// What stands in for the frame's own where its kernels work for the labels.
+/// Constants in the place of the frame's own where its kernels work for the labels.
 pub const DIRECT_FRAME: Array = Array::of::<Frame>("direct_frame", Word, |_| 1);
 
 /// Direct echoes of surfaces: complex, fixed-point sums.
@@ -37,10 +37,10 @@ pub const DIRECT_COUNTERS: Array = Array::of::<Counters>("direct_counters", Word
 /// Echoes of nothing: zeros.
 pub const NO_ECHOES: Array = Array::new("no_echoes", Integer, 2, Sizes::samples).zeroed();
 
-/// What `lateral` is for the labels.
+/// Stands in for `lateral` where kernels work for the labels.
 pub const LABEL_LATERAL: Array = Array::new("label_lateral", Float, 2, Sizes::samples);
 
-/// What `log_image` is for the labels.
+/// Stands in for `log_image` where kernels work for the labels.
 pub const LABEL_LOG_IMAGE: Array = Array::new("label_log_image", Float, 1, Sizes::samples);
 
 /// The stage that sums the power of scatterers along the segments.

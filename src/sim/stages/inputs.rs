@@ -11,7 +11,7 @@ pub const FRAME: Array = Array::of::<Frame>("frame", Word, |_| 1);
 /// Origin and direction of each scanline of the face.
 pub const SCANLINES: Array =
     Array::of::<Scanline>("scanlines", Float, |s| u64::from(s.frame.face_lines()) + 1);
-/// What belongs to each depth: widths, gains, and scales of the fixed-point sums.
+/// Widths, gains, and scales of the fixed-point sums at each depth.
 pub const ROWS: Array = Array::of::<Row>("rows", Float, |s| s.frame.samples.into());
 /// The scene's tissues.
 pub const TISSUES: Array = Array::of::<Tissue>("tissues", Word, |s| s.tissues);

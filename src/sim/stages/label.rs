@@ -14,7 +14,7 @@ use crate::scene::Scene;
 /// Constants of the frame before.
 pub const FRAME_BEFORE: Array = Array::of::<Frame>("frame_before", Word, |_| 1);
 
-/// What each sample shows.
+/// Labels of the samples: tissue, instance, place, loss and more.
 pub const LABELS: Array = Array::of::<Label>("labels", Word, Sizes::samples);
 
 /// The stage.

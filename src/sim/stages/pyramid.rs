@@ -20,10 +20,10 @@ pub const FINE: Array = Array::given("fine", Float, 4);
 /// Sums of the next coarser level.
 pub const COARSE: Array = Array::given("coarse", Float, 4);
 
-/// What the coarser levels change.
+/// Change of the image by the coarser levels.
 pub const COARSE_CHANGE: Array = Array::given("coarse_change", Float, 1);
 
-/// What a level and the coarser ones change.
+/// Change of the image by a level and the coarser ones.
 pub const CHANGE: Array = Array::given("change", Float, 1);
 
 /// The stage that computes the finest level.
