@@ -1,23 +1,17 @@
-//! What holds of the sources as a whole: who writes standard error, who needs a certain system, who holds the lock of Vulkan's
+//! Rules for the sources as a whole: who writes standard error, who needs a certain system, who holds the lock of Vulkan's
 //! loader.
 
-use std::fs;
 use std::path::{Path, PathBuf};
+
+use crate::common::limited::files;
 
 /// The Rust sources below folders, each with its text.
 fn sources(folders: &[&str]) -> Vec<(PathBuf, String)> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let mut todo: Vec<PathBuf> = folders.iter().map(|folder| root.join(folder)).collect();
-    let mut found = Vec::new();
-    while let Some(path) = todo.pop() {
-        if path.is_dir() {
-            let entries = fs::read_dir(&path).expect("a folder");
-            todo.extend(entries.map(|entry| entry.expect("an entry").path()));
-        } else if path.extension().is_some_and(|e| e == "rs") {
-            let text = fs::read_to_string(&path).expect("a source");
-            found.push((path, text));
-        }
-    }
+    let is_source = |path: &Path| path.extension().is_some_and(|e| e == "rs");
+    let paths = folders.iter().flat_map(|folder| files(&root.join(folder), is_source));
+    let read = |path: PathBuf| (path.clone(), std::fs::read_to_string(path).expect("a source"));
+    let found: Vec<_> = paths.map(read).collect();
     assert!(found.len() > 20, "{} sources in {folders:?}", found.len());
     found
 }
@@ -30,7 +24,7 @@ fn standard_error_is_written_by_one_module() {
     }
 }
 
-/// What Windows or macOS has not, as it stands in sources.
+/// Parts of a source that Windows or macOS has not.
 const OF_ONE_SYSTEM: [&str; 6] = ["os::unix", "os::linux", "os::fd", "libc::", "\"/proc", "\"/dev"];
 
 /// Lines of a source, without the tests at its end, that need one system.
@@ -80,9 +74,9 @@ fn functions(source: &str) -> Vec<String> {
     let lines: Vec<&str> = source.lines().collect();
     let indentation = |line: &str| line.len() - line.trim_start().len();
     let begins = |line: &str| {
-        let words = line.trim_start().split(' ').take_while(|word| !word.contains("fn"));
+        let mut words = line.trim_start().split(' ').take_while(|word| !word.contains("fn"));
         let before_name = ["pub", "pub(super)", "pub(crate)", "unsafe", "const", "extern", "\"C\""];
-        line.contains("fn ") && words.into_iter().all(|word| before_name.contains(&word))
+        line.contains("fn ") && words.all(|word| before_name.contains(&word))
     };
     let one = |(first, line): (usize, &&str)| {
         let end = format!("{}}}", " ".repeat(indentation(line)));

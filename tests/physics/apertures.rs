@@ -185,7 +185,7 @@ fn widths(bench: &Bench, physics: Physics) -> Outcome {
             let point = format!("{which}, point at {depth}, focus at {focus} mm");
             let quadrature = bench
                 .memo
-                .once(&&*point, true, || array.widths(depth, focus, number(&row["elements"])));
+                .once(&point, true, || array.widths(depth, focus, number(&row["elements"])));
             for (i, way) in ["axial", "lateral"].into_iter().enumerate() {
                 let what = format!("quadrature: {point}: {way} width, mm");
                 out.compare(what, quadrature[i], theirs[i], 0.01 * theirs[i])

@@ -112,7 +112,7 @@ fn closest_hits(bench: &Bench, physics: Physics) -> Outcome {
         Arc::make_mut(&mut traced.meshes[0]).triangles[17] = [0; 3];
     }
     let rays = rays(&scene, 60_000, 33);
-    let exact = bench.memo.once(&"exact", true, || -> Vec<_> {
+    let exact = bench.memo.once(&"closest hits", true, || -> Vec<_> {
         rays.par_iter().map(|ray| expected(&scene, ray)).collect()
     });
     let mut out = Outcome::default();

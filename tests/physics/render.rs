@@ -138,9 +138,9 @@ pub fn renderers(device: &Arc<gpu::Device>, tracers: &[Tracer], memo: &Memo) -> 
         let (memo, room) = (memo.clone(), Cell::new(KEPT));
         let frame = move |scene: &Scene| {
             let samples = (scene.probe.scanlines * scene.probe.samples) as usize;
-            let left = room.get().checked_sub(samples);
-            memo.once(&(name, scene), left.is_some(), || {
-                room.set(left.unwrap_or(room.get()));
+            let fits = samples <= room.get();
+            memo.once(&(name, scene), fits, || {
+                room.update(|left| if fits { left - samples } else { left });
                 make(scene)
             })
         };
