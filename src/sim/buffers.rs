@@ -33,7 +33,8 @@ impl Buffers {
         device: &Arc<Device>,
         arrays: impl Iterator<Item = &'static Array>,
     ) -> Result<Self, GpuError> {
-        let shared = tables::ARRAYS.iter().filter_map(|array| self.made.get_key_value(array.name));
+        let shared =
+            tables::ARRAYS.iter().filter_map(|(array, _)| self.made.get_key_value(array.name));
         let made = shared.map(|(name, (array, buffer))| (*name, (*array, buffer.clone())));
         let mut buffers = Self { made: made.collect(), room: self.room };
         buffers.add(device, arrays)?;
@@ -43,7 +44,7 @@ impl Buffers {
     /// Bytes of the buffers that no other lane shares.
     pub(super) fn own_bytes(&self) -> u64 {
         let own = |(array, _): &&(&Array, Buffer)| {
-            array.within.is_none() && !tables::ARRAYS.iter().any(|shared| shared.name == array.name)
+            array.within.is_none() && !tables::ARRAYS.iter().any(|(shared, _)| shared == array)
         };
         self.made.values().filter(own).map(|(_, buffer)| buffer.size()).sum()
     }
@@ -57,9 +58,7 @@ impl Buffers {
         let missing: Vec<_> = arrays.filter(|array| !self.has(array)).collect();
         let within = |array: &&&Array| array.within.is_some();
         for array in missing.iter().filter(|array| !within(array)) {
-            let guests = missing
-                .iter()
-                .filter(|guest| guest.within.is_some_and(|host| host.name == array.name));
+            let guests = missing.iter().filter(|guest| guest.within == Some(array));
             let bytes = guests.chain([array]).map(|a| a.bytes(&self.room)).max().unwrap_or(0);
             let buffer = device.buffer(array.name, bytes.max(16), BufferKind::Storage)?;
             self.made.insert(array.name, (array, buffer));

@@ -3,8 +3,7 @@
 use super::layout::{self, ROLE_BRANCHES};
 use super::pass::Extent;
 use super::passes::{Instead, Passes};
-use super::stages::trace;
-use super::stages::{APERTURE, EXPECT, ORIGIN, SCATTER, TRACE, aperture, scatter};
+use super::stages::{APERTURE, EXPECT, ORIGIN, SCATTER, TRACE, aperture, scatter, trace};
 use crate::gpu::{Commands, GpuError, Stage};
 
 impl Passes {

@@ -5,8 +5,7 @@ use super::lane::Lane;
 use super::layout::Frame;
 use super::pass::{Array, Extent};
 use super::passes::Passes;
-use super::stages::{AXIAL, BEAM, TRACE};
-use super::stages::{axial, beam, expect, inputs, scatter, trace};
+use super::stages::{AXIAL, BEAM, TRACE, axial, beam, expect, inputs, scatter, trace};
 use crate::gpu::{Buffer, Commands, GpuError, Stage};
 
 /// A number of segments that leaves no room for another, and enough for all of them to be counted.

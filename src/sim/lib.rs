@@ -196,8 +196,9 @@ impl Simulator {
 
     fn upload_tables(&self) -> Result<(), GpuError> {
         let buffers = &self.passes.lanes[0].buffers;
-        let arrays = self.tables.arrays().into_iter().filter(|(_, bytes)| !bytes.is_empty());
-        let arrays: Vec<_> = arrays.map(|(array, bytes)| (&buffers[array], 0, bytes)).collect();
+        let contents = tables::ARRAYS.map(|(array, content)| (array, content(&self.tables)));
+        let filled = contents.into_iter().filter(|(_, bytes)| !bytes.is_empty());
+        let arrays: Vec<_> = filled.map(|(array, bytes)| (&buffers[array], 0, bytes)).collect();
         self.device.upload_many(&arrays)
     }
 

@@ -51,7 +51,7 @@ pub struct Array {
     pub element: Element,
     /// Words per entry.
     pub words: usize,
-    /// Number of entries; none for a part of the anatomy, whose size follows from the scene's geometry.
+    /// Number of entries; none for what no stage makes ([`Self::given`]).
     pub entries: Option<fn(&Sizes) -> u64>,
     /// True if it is set to zero when a frame begins, because kernels add to it.
     pub zeroed: bool,
@@ -75,13 +75,9 @@ impl Array {
         Self::new(name, element, size_of::<T>() / 4, entries)
     }
 
-    /// An array that each dispatch is given as a buffer or image of its own: a level of a pyramid, the volume.
+    /// An array that no stage makes: a part of the anatomy, or what each dispatch is given in its place (a level of a
+    /// pyramid, the volume).
     pub const fn given(name: &'static str, element: Element, words: usize) -> Self {
-        Self { name, element, words, entries: None, zeroed: false, within: None }
-    }
-
-    /// An array that is a part of the anatomy.
-    pub const fn anatomy(name: &'static str, element: Element, words: usize) -> Self {
         Self { name, element, words, entries: None, zeroed: false, within: None }
     }
 
@@ -95,9 +91,16 @@ impl Array {
         Self { within: Some(other), ..self }
     }
 
-    /// Size in bytes in a frame of these sizes; 0 for a part of the anatomy.
+    /// Size in bytes in a frame of these sizes; 0 for what no stage makes.
     pub fn bytes(&self, sizes: &Sizes) -> u64 {
         4 * self.words as u64 * self.entries.map_or(0, |entries| entries(sizes))
+    }
+}
+
+/// Arrays are told apart by their names.
+impl PartialEq for Array {
+    fn eq(&self, other: &Self) -> bool {
+        self.name == other.name
     }
 }
 

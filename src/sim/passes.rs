@@ -97,11 +97,11 @@ impl Passes {
         array: &Array,
         given: &[(&Array, &'a Buffer)],
     ) -> Binding<'a> {
-        if let Some((_, buffer)) = given.iter().find(|(of, _)| of.name == array.name) {
+        if let Some((_, buffer)) = given.iter().find(|(of, _)| *of == array) {
             return Binding::Buffer(buffer);
         }
         match &lane.fusion {
-            Some(fusion) if array.name == ACQUIRED.name => Binding::Image(fusion.shown()),
+            Some(fusion) if *array == ACQUIRED => Binding::Image(fusion.shown()),
             _ => self.world.binding(array).unwrap_or_else(|| Binding::Buffer(&lane.buffers[array])),
         }
     }

@@ -136,8 +136,18 @@ pub fn piece(sample_pitch: f64) -> u32 {
 }
 
 /// Arrays that the tables fill, which all images of a frame share. Tissues are not among them: their seeds may be others in
-/// every image.
-pub const ARRAYS: [&Array; 6] = [&SCANLINES, &ROWS, &SURFACES, &POINTS, &GREY, &SPECKLE];
+/// every image. Each with its content.
+pub const ARRAYS: [(&Array, Content); 6] = [
+    (&SCANLINES, |tables| bytemuck::cast_slice(&tables.scanlines)),
+    (&ROWS, |tables| bytemuck::cast_slice(&tables.rows)),
+    (&SURFACES, |tables| bytemuck::cast_slice(&tables.surfaces)),
+    (&POINTS, |tables| bytemuck::cast_slice(&tables.points)),
+    (&GREY, |tables| bytemuck::cast_slice(&tables.grey)),
+    (&SPECKLE, |tables| bytemuck::cast_slice(&tables.speckle)),
+];
+
+/// Bytes of one of the tables.
+type Content = fn(&Tables) -> &[u8];
 
 /// The tables that stay the same from frame to frame, in the device's layout.
 pub struct Tables {
@@ -177,19 +187,6 @@ impl Tables {
     /// [`frame`] 0 of `scene`, which has the settings that these are the tables of.
     pub(super) fn frame(&self, scene: &Scene) -> layout::Frame {
         constants(scene, 0, self.scales)
-    }
-
-    /// [`ARRAYS`], each with its content.
-    pub fn arrays(&self) -> [(&'static Array, &[u8]); 6] {
-        let contents: [&[u8]; 6] = [
-            bytemuck::cast_slice(&self.scanlines),
-            bytemuck::cast_slice(&self.rows),
-            bytemuck::cast_slice(&self.surfaces),
-            bytemuck::cast_slice(&self.points),
-            bytemuck::cast_slice(&self.grey),
-            bytemuck::cast_slice(&self.speckle),
-        ];
-        std::array::from_fn(|i| (ARRAYS[i], contents[i]))
     }
 }
 

@@ -326,23 +326,22 @@ impl World {
     /// The binding of an array, if it is a part of the anatomy ([`super::stages::ANATOMY`]).
     pub fn binding(&self, array: &Array) -> Option<Binding<'_>> {
         let geometry = &self.geometry;
-        let is = |part: &Array| part.name == array.name;
-        if is(&inputs::NODES) {
+        if *array == inputs::NODES {
             return Some(self.structure());
         }
+        let past = self.past.as_ref();
         let parts = [
-            (&inputs::INSTANCES, &geometry.instances),
-            (&inputs::VERTICES, &geometry.vertices),
-            (&inputs::NORMALS, &geometry.normals),
-            (&inputs::SMOOTHED, &geometry.smoothed),
-            (&inputs::TRIANGLES, &geometry.triangles),
-            (&inputs::FIELDS, &geometry.fields),
+            (&inputs::INSTANCES, Some(&geometry.instances)),
+            (&inputs::VERTICES, Some(&geometry.vertices)),
+            (&inputs::NORMALS, Some(&geometry.normals)),
+            (&inputs::SMOOTHED, Some(&geometry.smoothed)),
+            (&inputs::TRIANGLES, Some(&geometry.triangles)),
+            (&inputs::FIELDS, Some(&geometry.fields)),
+            (&inputs::INSTANCES_BEFORE, past.map(|past| &past.instances)),
+            (&inputs::FIELDS_BEFORE, past.map(|past| &past.fields)),
         ];
-        let past = self.past.as_ref().map(|past| {
-            [(&inputs::INSTANCES_BEFORE, &past.instances), (&inputs::FIELDS_BEFORE, &past.fields)]
-        });
-        let mut parts = parts.into_iter().chain(past.into_iter().flatten());
-        parts.find(|(part, _)| is(part)).map(|(_, buffer)| Binding::Buffer(buffer))
+        let (_, buffer) = parts.into_iter().find(|(part, _)| *part == array)?;
+        buffer.map(Binding::Buffer)
     }
 
     /// True if the tissue of any instance deforms.

@@ -3,8 +3,7 @@
 use super::super::layout::Label;
 use super::super::pass::{Array, Pass, Sizes, per_pixel};
 use super::inputs::FRAME;
-use super::label::LABELS;
-use super::label::wanted;
+use super::label::{LABELS, wanted};
 use crate::output::npy::Element::Word;
 
 /// Labels of the pixels: those of the samples that they show.

@@ -30,24 +30,24 @@ pub const CONTACT: Array =
 /// Counters, to which every kernel may add.
 pub const COUNTERS: Array = Array::of::<Counters>("counters", Word, |_| 1).zeroed();
 /// Placements of the meshes.
-pub const INSTANCES: Array = Array::anatomy("instances", Word, size_of::<Instance>() / 4);
+pub const INSTANCES: Array = Array::given("instances", Word, size_of::<Instance>() / 4);
 /// Vertices of all meshes, mm.
-pub const VERTICES: Array = Array::anatomy("vertices", Float, 3);
+pub const VERTICES: Array = Array::given("vertices", Float, 3);
 /// Normals of all vertices.
-pub const NORMALS: Array = Array::anatomy("normals", Float, 3);
+pub const NORMALS: Array = Array::given("normals", Float, 3);
 /// Averages of the normals around each vertex, with their coherence.
-pub const SMOOTHED: Array = Array::anatomy("smoothed", Word, 4);
+pub const SMOOTHED: Array = Array::given("smoothed", Word, 4);
 /// Three indices into the vertices per triangle.
-pub const TRIANGLES: Array = Array::anatomy("triangles", Word, 3);
+pub const TRIANGLES: Array = Array::given("triangles", Word, 3);
 /// Nodes of the structure that the tracer walks.
-pub const NODES: Array = Array::anatomy("nodes", Word, 20);
+pub const NODES: Array = Array::given("nodes", Word, 20);
 /// Displacement fields of deforming tissue.
-pub const FIELDS: Array = Array::anatomy("fields", Float, 4);
+pub const FIELDS: Array = Array::given("fields", Float, 4);
 /// Placements of the last frame.
 pub const INSTANCES_BEFORE: Array =
-    Array::anatomy("instances_before", Word, size_of::<Instance>() / 4);
+    Array::given("instances_before", Word, size_of::<Instance>() / 4);
 /// Displacement fields of the last frame.
-pub const FIELDS_BEFORE: Array = Array::anatomy("fields_before", Float, 4);
+pub const FIELDS_BEFORE: Array = Array::given("fields_before", Float, 4);
 
 /// The frame's constants, the scene's tables, the contact of the probe; and the counters, to which every
 /// kernel may add.

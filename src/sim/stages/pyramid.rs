@@ -12,13 +12,13 @@ use crate::gpu::{Commands, GpuError};
 use crate::output::npy::Element::Float;
 
 /// Sums of the finest level.
-pub const LEVEL_SUMS: Array = Array::given("level", Float, 4);
+pub const LEVEL_SUMS: Array = Array::given("level", Float, 3);
 
 /// Sums of a level.
-pub const FINE: Array = Array::given("fine", Float, 4);
+pub const FINE: Array = Array::given("fine", Float, 3);
 
 /// Sums of the next coarser level.
-pub const COARSE: Array = Array::given("coarse", Float, 4);
+pub const COARSE: Array = Array::given("coarse", Float, 3);
 
 /// Change of the image by the coarser levels.
 pub const COARSE_CHANGE: Array = Array::given("coarse_change", Float, 1);

@@ -64,6 +64,11 @@ mod tests {
         }
     }
 
+    fn key(key: Key) -> Event {
+        let modifiers = Modifiers::NONE;
+        Event::Key { key, physical_key: None, pressed: true, repeat: false, modifiers }
+    }
+
     /// Distance by which a panel from x = 20 on was dragged, and number of clicks on it.
     fn drawn(context: &Context, inputs: Vec<RawInput>) -> (Vec2, usize) {
         let (mut by, mut clicks) = (Vec2::ZERO, 0);
@@ -125,13 +130,6 @@ mod tests {
 
     #[test]
     fn what_is_typed_between_two_pictures_goes_where_the_click_was_and_no_farther_than_enter() {
-        let key = |key| Event::Key {
-            key,
-            physical_key: None,
-            pressed: true,
-            repeat: false,
-            modifiers: Modifiers::NONE,
-        };
         let typed = |letter: &str| [key(Key::C), Event::Text(letter.to_owned())];
         let mut events = vec![moved(30.0), button(30.0, true), button(30.0, false)];
         events.extend(typed("c"));
@@ -161,13 +159,6 @@ mod tests {
     // `145 mm` and Enter became 14 mm.
     #[test]
     fn a_number_that_is_typed_with_enter_between_two_pictures_is_taken_whole() {
-        let key = |key| Event::Key {
-            key,
-            physical_key: None,
-            pressed: true,
-            repeat: false,
-            modifiers: Modifiers::NONE,
-        };
         let typed = |text: &str| -> Vec<Event> {
             text.chars().map(|letter| Event::Text(letter.to_string())).collect()
         };
