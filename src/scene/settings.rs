@@ -39,29 +39,46 @@ pub(crate) use words::words;
 /// What is done with each group of [`Settings`].
 pub trait Visitor {
     /// Does it with one of them.
-    fn visit<T: Group>(&mut self, group: &T);
+    fn visit<T: Group>(&mut self, group: Member<T>);
+}
+
+/// A group of [`Settings`], as a field of any of them.
+pub struct Member<T> {
+    /// The group of these settings.
+    pub of: fn(&Settings) -> &T,
+    /// The same, to be changed.
+    pub of_mut: fn(&mut Settings) -> &mut T,
 }
 
 macro_rules! settings {
-    ($($(#[$doc:meta])+ $field:ident: $of:ty;)+) => {
+    ($(#[$probe_doc:meta])+ $probe:ident: $probe_of:ty; $($(#[$doc:meta])+ $field:ident: $of:ty;)+) => {
         /// Settings of imaging: those that presets, parameter studies, qualities and the console set alike.
         #[derive(Clone, Debug, PartialEq)]
         pub struct Settings {
+            $(#[$probe_doc])+ pub $probe: $probe_of,
             $($(#[$doc])+ pub $field: $of,)+
         }
 
         impl Settings {
             /// The tables of scene files that have them.
-            pub const TABLES: &'static [&'static str] = &[$(<$of as Group>::TABLE),+];
+            pub const TABLES: &'static [&'static str] =
+                &[<$probe_of as Group>::TABLE, $(<$of as Group>::TABLE),+];
+
+            /// The defaults, for a probe.
+            pub fn of($probe: $probe_of) -> Self {
+                Self { $probe, $($field: <$of>::default(),)+ }
+            }
 
             /// Does something with each group, in the order of [`Self::TABLES`].
-            pub fn each(&self, visitor: &mut impl Visitor) {
-                $(visitor.visit(&self.$field);)+
+            pub fn each(visitor: &mut impl Visitor) {
+                visitor.visit(Member { of: |s| &s.$probe, of_mut: |s| &mut s.$probe });
+                $(visitor.visit(Member { of: |s| &s.$field, of_mut: |s| &mut s.$field });)+
             }
         }
     };
 }
 
+// The first one, without which there are no settings, and those that have defaults.
 settings! {
     /// Transducer and its geometry.
     probe: Probe;
@@ -72,27 +89,24 @@ settings! {
 }
 
 impl Settings {
-    /// The defaults, for a probe.
-    pub fn of(probe: Probe) -> Self {
-        Self { probe, simulation: Simulation::default(), imaging: Imaging::default() }
-    }
-
     /// The value of a key of a table; none where the table is not among these or has no such key.
     pub fn value(&self, table: &str, key: &str) -> Option<Value> {
-        struct Find<'k> {
-            table: &'k str,
-            key: &'k str,
+        struct Find<'s> {
+            settings: &'s Settings,
+            table: &'s str,
+            key: &'s str,
             found: Option<Value>,
         }
         impl Visitor for Find<'_> {
-            fn visit<T: Group>(&mut self, group: &T) {
+            fn visit<T: Group>(&mut self, group: Member<T>) {
                 if T::TABLE == self.table {
-                    self.found = T::row(self.key).map(|row| (row.get)(group));
+                    let value = |row: &Row<T>| (row.get)((group.of)(self.settings));
+                    self.found = T::row(self.key).map(value);
                 }
             }
         }
-        let mut find = Find { table, key, found: None };
-        self.each(&mut find);
+        let mut find = Find { settings: self, table, key, found: None };
+        Self::each(&mut find);
         find.found
     }
 

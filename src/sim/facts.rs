@@ -3,7 +3,7 @@
 use glam::DAffine3;
 use serde_json::{Map, Value, json};
 
-use crate::settings::{Group, Settings, Visitor};
+use crate::settings::{Group, Member, Settings, Visitor};
 
 /// Place of a picture in the image plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,8 +55,8 @@ pub fn settings(settings: &Settings) -> Value {
         "volume_floor_db": simulation.volume_floor,
         "branch_floor_db": simulation.branch_floor,
     });
-    let mut tables = Tables::default();
-    settings.each(&mut tables);
+    let mut tables = Tables { settings, tables: Map::new(), units: Map::new() };
+    Settings::each(&mut tables);
     let mut out = Map::new();
     out.insert("counts".into(), counts);
     out.extend(tables.tables);
@@ -65,15 +65,16 @@ pub fn settings(settings: &Settings) -> Value {
 }
 
 /// The tables of all groups, and the units of their keys.
-#[derive(Default)]
-struct Tables {
+struct Tables<'s> {
+    settings: &'s Settings,
     tables: Map<String, Value>,
     units: Map<String, Value>,
 }
 
-impl Visitor for Tables {
-    fn visit<T: Group>(&mut self, group: &T) {
-        self.tables.insert(T::TABLE.into(), table(group, &mut self.units));
+impl Visitor for Tables<'_> {
+    fn visit<T: Group>(&mut self, group: Member<T>) {
+        let table = table((group.of)(self.settings), &mut self.units);
+        self.tables.insert(T::TABLE.into(), table);
     }
 }
 
@@ -109,7 +110,7 @@ mod tests {
         assert_eq!(json["probe"]["depth"], 123.25);
         assert_eq!(json["units"]["probe.depth"], "mm");
         let mut entries = Vec::new();
-        for name in ["probe", "simulation", "imaging"] {
+        for name in Settings::TABLES {
             for (key, value) in json[name].as_object().expect("a table") {
                 let path = format!("{name}.{key}");
                 let text = match (json["units"][&path].as_str(), value) {

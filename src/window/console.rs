@@ -17,9 +17,10 @@ use std::time::Instant;
 use egui::{Align, CollapsingHeader, Key, RichText, ScrollArea, Ui};
 
 use super::files;
-use super::model::{Model, Source};
+use super::model::{ELABORATE, Model, Source};
 use super::naming::Wanted;
 use super::panel::{Desk, Dock, OpenPanels, Panel, Row};
+use crate::settings::{self, Group, Member, Visitor};
 use crate::style::{self, button};
 use poses::Naming;
 
@@ -95,6 +96,8 @@ impl Console {
             probe::show(ui, &mut desk.model.settings, &mut desk.common.open);
         });
         section(ui, "Image", true, |ui| image::show(ui, &mut desk.model.settings));
+        let settings = &mut desk.model.settings.imaged;
+        settings::Settings::each(&mut Others { ui, settings });
         section(ui, "Poses", false, |ui| match desk.model.examined {
             true => drop(ui.label(EXAMINED)),
             false => poses::show(ui, desk.model, &mut self.poses, now),
@@ -136,6 +139,23 @@ impl Console {
         if layer != model.layer {
             model.layer = layer;
             model.touch(now);
+        }
+    }
+}
+
+/// Sections of the groups that are no more than their rows.
+struct Others<'s> {
+    ui: &'s mut Ui,
+    settings: &'s mut settings::Settings,
+}
+
+impl Visitor for Others<'_> {
+    fn visit<T: Group>(&mut self, group: Member<T>) {
+        if !ELABORATE.contains(&T::TABLE) {
+            let (first, rest) = T::TABLE.split_at(1);
+            section(self.ui, &(first.to_uppercase() + rest), false, |ui| {
+                controls::group(ui, T::TABLE, (group.of_mut)(self.settings));
+            });
         }
     }
 }

@@ -47,6 +47,7 @@ use real::Real;
 use registration::Registration;
 pub use resuming::Leftover;
 pub use saving::File;
+pub(crate) use settings::ELABORATE;
 pub use settings::Settings;
 use sheet::{Marks, Sheet};
 use trajectory::Replay;

@@ -76,7 +76,7 @@ pub struct Level {
 
 impl Level {
     /// The present counts of a scene's settings.
-    pub fn of(Settings { probe, simulation, imaging }: &Settings) -> Self {
+    pub fn of(Settings { probe, simulation, imaging, .. }: &Settings) -> Self {
         Self {
             scanlines: probe.scanlines,
             layers: probe.elevation_layers,
@@ -91,7 +91,7 @@ impl Level {
     }
 
     /// Gives settings these counts.
-    pub fn apply(&self, Settings { probe, simulation, imaging }: &mut Settings) {
+    pub fn apply(&self, Settings { probe, simulation, imaging, .. }: &mut Settings) {
         probe.scanlines = self.scanlines;
         probe.elevation_layers = self.layers;
         probe.samples = self.samples;

@@ -39,7 +39,7 @@ fn slice(settings: &Settings) -> Option<Silent> {
 
 /// A lattice too coarse for the beam and the pulse, or for a thin slice.
 fn lattice(settings: &Settings) -> Option<Silent> {
-    let Settings { probe, simulation, imaging } = settings;
+    let Settings { probe, simulation, imaging, .. } = settings;
     if probe.slice_thickness == 0.0 || simulation.scatter_mode == ScatterMode::Voxel {
         return None;
     }
@@ -103,7 +103,7 @@ mod tests {
     fn settings(probe: Probe) -> Settings {
         let cell = Simulation::default_cell(probe.frequency);
         let simulation = Simulation { cell, ..Simulation::default() };
-        Settings { probe, simulation, imaging: Imaging::default() }
+        Settings { simulation, ..Settings::of(probe) }
     }
 
     #[test]

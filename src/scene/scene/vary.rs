@@ -3,7 +3,7 @@
 //! parameters and does not list them; [`SUGGESTED`] are ours.
 
 use crate::settings::units::ANGLE;
-use crate::settings::{Facts, Form, Group, Imaging, Probe, Settings, Simulation, Value};
+use crate::settings::{Facts, Form, Group, Member, Settings, Value, Visitor};
 
 /// Distance from the scene's own value, below and above.
 #[derive(Clone, Copy, Debug)]
@@ -64,7 +64,15 @@ fn numbers<T: Group>() -> impl Iterator<Item = Parameter> {
 impl Parameter {
     /// All parameters.
     pub fn all() -> impl Iterator<Item = Self> {
-        numbers::<Probe>().chain(numbers::<Simulation>()).chain(numbers::<Imaging>())
+        struct All(Vec<Parameter>);
+        impl Visitor for All {
+            fn visit<T: Group>(&mut self, _: Member<T>) {
+                self.0.extend(numbers::<T>());
+            }
+        }
+        let mut all = All(Vec::new());
+        Settings::each(&mut all);
+        all.0.into_iter()
     }
 
     /// The parameters of a contact sheet where the file names none, in its order.

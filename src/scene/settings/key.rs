@@ -98,7 +98,7 @@ pub struct Row<T> {
 }
 
 /// Settings that stand in one table of a scene file.
-pub trait Group: Sized + 'static {
+pub trait Group: Clone + PartialEq + Sized + 'static {
     /// The table: `probe`, `tissues.NAME`.
     const TABLE: &'static str;
 

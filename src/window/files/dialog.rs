@@ -11,6 +11,7 @@ use super::{Files, Purpose, message_of};
 use crate::model::Model;
 use crate::recent;
 use crate::scene::SceneError;
+use crate::settings::Settings;
 use crate::style::{self, button};
 use crate::way::Way;
 
@@ -295,9 +296,12 @@ fn load(
         *way = Some(Way::Open(path.clone()));
     }
     ui.separator();
-    let text = "[probe], [simulation] and [imaging], as far as the file has them. Anatomy and pose \
-        stay; Undo takes it back.";
-    if button(ui, true, "Take settings", text) {
+    let tables: Vec<String> = Settings::TABLES.iter().map(|table| format!("[{table}]")).collect();
+    let tables = tables.join(", ");
+    let text = format!(
+        "{tables}, as far as the file has them. Anatomy and pose stay; Undo takes it back."
+    );
+    if button(ui, true, "Take settings", &text) {
         outcome = Some(model.load_settings(&path, now));
     }
     outcome

@@ -4,12 +4,14 @@ use glam::{DAffine3, DVec3};
 use toml_edit::Value;
 
 use super::Settings;
+use super::settings::ELABORATE;
 use crate::register::{Placement, Transformation};
 use crate::scene::file::{self, Entry, quoted};
 use crate::scene::{Origin, Origins};
 use crate::settings::Value::Number;
 use crate::settings::{
-    Display, Exam, Fusion, Group, Live, Probe, Simulation, Surface, Tissue, plain,
+    self, Display, Exam, Fusion, Group, Live, Member, Probe, Simulation, Surface, Tissue, Visitor,
+    plain,
 };
 
 /// Path of the edge of a lattice cell, which follows from other settings.
@@ -34,6 +36,8 @@ pub(super) fn changes(
     out.extend(simulation.into_iter().filter(|(path, _)| path != CELL));
     out.extend(cell(from, to, lattice));
     out.extend(changes_with(&from.imaging, &to.imaging, exam.map(Exam::imaging)));
+    let mut others = Others { from, to, out: &mut out };
+    settings::Settings::each(&mut others);
     out.extend(file::changes(&from.live, &to.live, Live::TABLE));
     if let (Some(from), Some(to)) = (&from.fusion, &to.fusion) {
         out.extend(fusion_changes(from, to, origins));
@@ -60,6 +64,22 @@ pub(super) fn changes(
         done.push(origin);
     }
     out
+}
+
+/// Changes of the groups that are no more than their rows.
+struct Others<'s> {
+    from: &'s settings::Settings,
+    to: &'s settings::Settings,
+    out: &'s mut Vec<Entry>,
+}
+
+impl Visitor for Others<'_> {
+    fn visit<T: Group>(&mut self, group: Member<T>) {
+        if !ELABORATE.contains(&T::TABLE) {
+            let [from, to] = [self.from, self.to].map(group.of);
+            self.out.extend(file::changes(from, to, T::TABLE));
+        }
+    }
 }
 
 /// Path of the table with the strategy for an instance's keyframes.

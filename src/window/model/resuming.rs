@@ -5,7 +5,7 @@ use std::time::Instant;
 use super::sheet::Marks;
 use super::trajectory::Recording;
 use super::{KnownPose, Model, Settings, Source, StoredTrajectory};
-use crate::settings::Group;
+use crate::settings::{self, Group, Member, Visitor};
 
 /// What an earlier session has left unsaved beside its settings and poses.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
@@ -120,9 +120,14 @@ impl Settings {
     /// Makes the changes from `loaded` to `changed` in these settings of a scene that may have other tissues and
     /// meshes; `same` says whether a mesh there is the one here.
     fn carry(&mut self, loaded: &Self, changed: &Self, same: impl Fn(usize, usize) -> bool) {
-        carry(&loaded.probe, &changed.probe, &mut self.imaged.probe);
-        carry(&loaded.simulation, &changed.simulation, &mut self.imaged.simulation);
-        carry(&loaded.imaging, &changed.imaging, &mut self.imaged.imaging);
+        struct Carrying<'s>([&'s settings::Settings; 2], &'s mut settings::Settings);
+        impl Visitor for Carrying<'_> {
+            fn visit<T: Group>(&mut self, group: Member<T>) {
+                let [loaded, changed] = self.0.map(group.of);
+                carry(loaded, changed, (group.of_mut)(self.1));
+            }
+        }
+        settings::Settings::each(&mut Carrying([loaded, changed], &mut self.imaged));
         carry(&loaded.live, &changed.live, &mut self.live);
         if let (Some(loaded), Some(changed), Some(own)) =
             (&loaded.fusion, &changed.fusion, &mut self.fusion)

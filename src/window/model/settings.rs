@@ -5,8 +5,11 @@ use std::ops::{Deref, DerefMut};
 use glam::DAffine3;
 
 use crate::scene::{Acquired, Display, Fusion, Live, Scene, Strategy, Surface, Tissue};
-use crate::settings;
+use crate::settings::{self, Group, Imaging, Probe, Simulation};
 use crate::sim::Tracer;
+
+/// Tables of the groups of which the window knows more than their rows: it shows and saves each in its own way.
+pub(crate) const ELABORATE: [&str; 3] = [Probe::TABLE, Simulation::TABLE, Imaging::TABLE];
 
 /// Settings of a scene that change while it is imaged.
 #[derive(Clone, Debug, PartialEq)]

@@ -18,7 +18,7 @@ use super::playing::Following;
 use super::poses::PoseKeys;
 use super::probe::{Pose, PresetKey};
 use super::shelf::{MeshKeys, ShapeKeys};
-use super::table::{Key, Keys, Table, defaults, keys};
+use super::table::{Key, Keys, Stated, Table, defaults, keys};
 use super::tasks::TaskKeys;
 use super::tissues::TissueKeys;
 use super::tracker::{MatrixKey, TrackerKeys};
@@ -53,11 +53,20 @@ type Named<K> = BTreeMap<String, Table<K>>;
 trait Checked {
     /// Fails at the first value out of its range; `table` is written as in the reference.
     fn check(&self, document: &Document<'_>, table: &str) -> Result<(), SceneError>;
+
+    /// What is stated, where there is one such table.
+    fn stated(&self) -> Option<&Stated> {
+        None
+    }
 }
 
 impl<K: Keys> Checked for One<K> {
     fn check(&self, document: &Document<'_>, table: &str) -> Result<(), SceneError> {
         Table::check(self, document, table)
+    }
+
+    fn stated(&self) -> Option<&Stated> {
+        Some(&self.stated)
     }
 }
 
@@ -115,6 +124,14 @@ macro_rules! tables {
             fn check(&self, document: &Document<'_>) -> Result<(), SceneError> {
                 $(Checked::check(&self.$field, document, $table)?;)+
                 Ok(())
+            }
+
+            /// What the file states in a table that every file has.
+            pub fn stated(&self, table: &str) -> Option<&Stated> {
+                match table {
+                    $($table => Checked::stated(&self.$field),)+
+                    _ => None,
+                }
             }
         }
     };

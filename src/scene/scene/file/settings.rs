@@ -1,4 +1,4 @@
-//! The tables `probe`, `simulation` and `imaging`.
+//! The tables of [`Settings`].
 
 use std::path::Path;
 
@@ -7,12 +7,12 @@ use super::error::SceneError;
 use super::probe;
 use super::schema::File;
 use super::table::{Entry, entries};
-use crate::settings::{Group, Imaging, Settings, Simulation, Visitor};
+use crate::settings::{Group, Imaging, Member, Probe, Settings, Simulation, Visitor};
 
 /// Largest width of a picture, pixels: the limit of image files and messages.
 const WIDEST: f64 = 65535.0;
 
-/// The settings stated in the tables `probe`, `simulation` and `imaging` of `file`; what it leaves out is as the
+/// The settings stated in the tables of `file`; what it leaves out is as the
 /// examination that it names has it. Defaults of `simulation` that
 /// follow the frequency are those of a probe of `frequency` MHz, or without it of the file's probe.
 pub(super) fn settings(
@@ -23,20 +23,55 @@ pub(super) fn settings(
     let Imaging { exam, .. } = file.imaging.stated.get("");
     let probe = probe::build(document, &file.probe.stated, exam)?;
     let cell = Simulation::default_cell(frequency.unwrap_or(probe.frequency));
-    let mut simulation = Simulation { cell, ..Simulation::default() };
-    file.simulation.stated.put("", &mut simulation);
-    simulation.cell /= simulation.crowding();
-    let mut imaging = exam.imaging();
-    file.imaging.stated.put("", &mut imaging);
-    Ok(Settings { probe, simulation, imaging })
+    let simulation = Simulation { cell, ..Simulation::default() };
+    let mut settings = Settings { simulation, imaging: exam.imaging(), ..Settings::of(probe) };
+    Settings::each(&mut Stating { file, settings: &mut settings });
+    settings.simulation.cell /= settings.simulation.crowding();
+    Ok(settings)
 }
 
-/// Takes those of `settings` over from a scene file of which it has a table - `[probe]`, `[simulation]`, `[imaging]` -
+/// What a file states of each group but the probe, which is more than its rows.
+struct Stating<'s> {
+    file: &'s File,
+    settings: &'s mut Settings,
+}
+
+impl Visitor for Stating<'_> {
+    fn visit<T: Group>(&mut self, group: Member<T>) {
+        if let Some(stated) = self.file.stated(T::TABLE).filter(|_| T::TABLE != Probe::TABLE) {
+            stated.put("", (group.of_mut)(self.settings));
+        }
+    }
+}
+
+/// Takes over the groups of which a file has a table.
+struct Taking<'s> {
+    tables: &'s [&'static str],
+    from: &'s Settings,
+    to: &'s mut Settings,
+}
+
+impl Visitor for Taking<'_> {
+    fn visit<T: Group>(&mut self, group: Member<T>) {
+        if self.tables.contains(&T::TABLE) {
+            (group.of_mut)(self.to).clone_from((group.of)(self.from));
+        }
+    }
+}
+
+/// The tables of [`Settings`] as a sentence has them.
+fn tables(last: &str) -> String {
+    let names: Vec<String> = Settings::TABLES.iter().map(|table| format!("[{table}]")).collect();
+    let (end, before) = names.split_last().expect("there are some");
+    format!("{} {last} {end}", before.join(", "))
+}
+
+/// Takes those of `settings` over from a scene file of which it has a table,
 /// and reads nothing that they do not need: no mesh, no volume. Where it has no `[probe]`, defaults that follow the
 /// frequency are those of the present probe.
 ///
 /// # Errors
-/// Those of [`crate::scene::Scene::load`]; a file without any of the three tables. `settings` are then unchanged.
+/// Those of [`crate::scene::Scene::load`]; a file without any of the tables. `settings` are then unchanged.
 pub fn load_settings(path: &Path, settings: &mut Settings) -> Result<(), SceneError> {
     let source = Source::read(path, &[])?;
     let document = source.document()?;
@@ -44,38 +79,39 @@ pub fn load_settings(path: &Path, settings: &mut Settings) -> Result<(), SceneEr
     let has_probe = document.says_of("probe", "pose");
     let frequency = settings.probe.frequency;
     let found = self::settings(&document, &file, (!has_probe).then_some(frequency))?;
-    let [has_simulation, has_imaging] =
-        ["simulation", "imaging"].map(|table| document.says_of(table, ""));
-    if !(has_probe || has_simulation || has_imaging) {
+    let says = |table: &&str| match *table {
+        Probe::TABLE => has_probe,
+        table => document.says_of(table, ""),
+    };
+    let said: Vec<&str> = Settings::TABLES.iter().copied().filter(says).collect();
+    if said.is_empty() {
         return Err(SceneError::file(
             path,
-            "says nothing of [probe], [simulation] or [imaging]".to_owned(),
+            format!("says nothing of {}", tables("or")),
             "choose a scene file with one of these tables",
         ));
     }
     if has_probe {
-        settings.probe = found.probe;
+        settings.probe = found.probe.clone();
         settings.follow_frequency(frequency);
     }
-    if has_simulation {
-        settings.simulation = found.simulation;
-    }
-    if has_imaging {
-        settings.imaging = found.imaging;
-    }
+    Settings::each(&mut Taking { tables: &said, from: &found, to: settings });
     Ok(())
 }
 
 /// All settings as entries.
-struct Entries(Vec<Entry>);
+struct Entries<'s> {
+    of: &'s Settings,
+    found: Vec<Entry>,
+}
 
-impl Visitor for Entries {
-    fn visit<T: Group>(&mut self, group: &T) {
-        self.0.extend(entries(group, T::TABLE));
+impl Visitor for Entries<'_> {
+    fn visit<T: Group>(&mut self, group: Member<T>) {
+        self.found.extend(entries((group.of)(self.of), T::TABLE));
     }
 }
 
-/// Gives `settings` the values of these entries, as `--set` takes them: of keys in `probe`, `simulation` and `imaging`.
+/// Gives `settings` the values of these entries, as `--set` takes them: of keys in the tables of [`Settings`].
 ///
 /// # Errors
 /// The first entry that does not fit; `settings` are then unchanged.
@@ -89,21 +125,22 @@ pub fn put_settings(pairs: &[(String, String)], settings: &mut Settings) -> Resu
             return Err(SceneError::file(
                 place,
                 format!("`{path}` is no setting of a running window"),
-                "set keys of [probe], [simulation] and [imaging]; `insonify serve` takes any",
+                &format!("set keys of {}; `insonify serve` takes any", tables("and")),
             ));
         }
     }
     // As a file says it: before its division for scatterers that do not fit into the cells.
     let cell = settings.simulation.cell * settings.simulation.crowding();
     let simulation = Simulation { cell, ..settings.simulation.clone() };
-    let mut own = Entries(Vec::new());
-    Settings { simulation, ..settings.clone() }.each(&mut own);
+    let as_said = Settings { simulation, ..settings.clone() };
+    let mut own = Entries { of: &as_said, found: Vec::new() };
+    Settings::each(&mut own);
     let sets = |path: &str| pairs.iter().any(|(set, _)| set == path);
     let is_kept = |path: &str| {
         // Those of a preset are the preset's.
         !(sets(path) || sets("probe.preset") && path.starts_with("probe."))
     };
-    let own = own.0.into_iter().filter(|(path, _)| is_kept(path));
+    let own = own.found.into_iter().filter(|(path, _)| is_kept(path));
     let own = own.filter_map(|(path, value)| Some((path, value?)));
     let all: Vec<_> = own.chain(pairs.iter().cloned()).collect();
     let source = Source::of(place, String::new()).with(&all);
@@ -153,6 +190,7 @@ mod tests {
             probe: Probe { frequency: 5.0, ..Probe::linear() },
             simulation: Simulation { paths: 77, cell: 0.3, ..Simulation::default() },
             imaging: Imaging { gain: 3.0, noise: -90.0, ..Imaging::default() },
+            ..Settings::of(Probe::linear())
         }
     }
 
