@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use egui::{CentralPanel, Frame as Space, Panel as Strip, Rect, RichText, Ui};
+use egui::{CentralPanel, Frame as Space, Panel as Strip, Rect, RichText, TextStyle, Ui};
 use glam::DVec3;
 
 use super::bmode;
@@ -17,10 +17,8 @@ use super::{
 };
 use crate::settings::Exam;
 
-/// Width of the toggles and the loop beside each other, points.
-const BAR: f32 = 940.0;
-/// Width of one toggle more, where there is a volume.
-const PLANES: f32 = 62.0;
+/// Width of the loop's controls, points.
+const LOOP: f32 = 560.0;
 
 /// Least height that is left to the image beside a panel of timings, and least width beside the worksheet, points.
 const LEAST_IMAGE: f32 = 200.0;
@@ -108,8 +106,7 @@ fn open(panel: &dyn Panel, desk: &Desk<'_>) -> Option<Dock> {
 
 /// Draws the buttons of the panels, and the controls of the loop: one below the other where there is no room beside each other.
 fn bar(ui: &mut Ui, model: &mut Model, state: &mut State, now: Instant) {
-    let more = if model.registration.is_some() { PLANES } else { 0.0 };
-    let rows = if ui.available_width() < BAR + more { 2 } else { 1 };
+    let rows = if ui.available_width() < LOOP + toggled(ui, model, state) { 2 } else { 1 };
     Strip::bottom("bar").resizable(false).exact_size(cine::HEIGHT * rows as f32).show(ui, |ui| {
         match rows {
             1 => drop(ui.horizontal_centered(|ui| {
@@ -126,11 +123,27 @@ fn bar(ui: &mut Ui, model: &mut Model, state: &mut State, now: Instant) {
     });
 }
 
+/// Width of the buttons that open the panels, points.
+fn toggled(ui: &Ui, model: &Model, state: &mut State) -> f32 {
+    let font = TextStyle::Button.resolve(ui.style());
+    let beside = 2.0 * ui.spacing().button_padding.x + ui.spacing().item_spacing.x;
+    let width = |name: &str| {
+        let text = ui.painter().layout_no_wrap(name.to_owned(), font.clone(), style::TEXT);
+        text.size().x + beside
+    };
+    let all = state.panels.all().into_iter();
+    all.filter(|panel| has_button(*panel, model)).map(|panel| width(panel.row().name)).sum()
+}
+
+fn has_button(panel: &dyn Panel, model: &Model) -> bool {
+    panel.row().has_button && panel.is_offered(model)
+}
+
 /// Buttons that open the panels.
 fn toggles(ui: &mut Ui, model: &mut Model, state: &mut State, now: Instant) {
     for panel in state.panels.all() {
         let row = panel.row();
-        if !row.has_button || !panel.is_offered(model) {
+        if !has_button(panel, model) {
             continue;
         }
         let is_open = panel.is_open(model, &state.common.open);

@@ -4,7 +4,6 @@ mod history;
 mod marking;
 mod measured;
 
-use std::sync::Arc;
 use std::time::Instant;
 
 use egui::{Align2, Color32, Context, RichText, Shape, Stroke, TextEdit, Ui, vec2};
@@ -16,7 +15,7 @@ use self::measured::Measured;
 use super::look::Pictured;
 use super::model::trajectory::Recorder;
 use super::model::{Model, Source};
-use super::panel::{Desk, Dock, Panel, Row};
+use super::panel::{Desk, Dock, Panel, Row, Wake};
 use super::style::{self, button};
 use super::view3d;
 use crate::scene::task::{Goal, Task};
@@ -38,6 +37,7 @@ pub(super) const ROW: Row = Row {
 };
 
 /// The panel's state; not saved.
+#[derive(Default)]
 pub(super) struct Lesson {
     /// True while the panel is open.
     open: bool,
@@ -61,8 +61,6 @@ pub(super) struct Lesson {
     learner: String,
     measured: Measured,
     answer: Option<usize>,
-    /// Called by the thread that scores, at its end.
-    wake: Arc<dyn Fn() + Send + Sync>,
 }
 
 /// An attempt under way.
@@ -72,26 +70,6 @@ struct Run {
 }
 
 impl Lesson {
-    /// A panel that is closed. `wake` is called, from another thread, when a score is there.
-    pub(super) fn new(wake: Arc<dyn Fn() + Send + Sync>) -> Self {
-        Self {
-            open: false,
-            chosen: 0,
-            examiner: false,
-            guide: false,
-            hints: 0,
-            run: None,
-            marking: None,
-            result: None,
-            page: None,
-            problem: None,
-            learner: String::new(),
-            measured: Measured::default(),
-            answer: None,
-            wake,
-        }
-    }
-
     /// The target to be shown in 3D, while the guide shows it.
     fn ghost(&self, model: &Model) -> Option<DAffine3> {
         let goal = &model.tasks.get(self.chosen)?.goal;
@@ -211,7 +189,7 @@ impl Panel for Lesson {
             }
             match lesson.run.is_some() {
                 false => before(ui, model, lesson, now),
-                true => during(ui, model, lesson, now),
+                true => during(ui, model, (lesson, &common.wake), now),
             }
             if lesson.marking.is_some() {
                 ui.label("Scoring ...");
@@ -227,7 +205,7 @@ impl Panel for Lesson {
     fn leave(&mut self) {
         let Self { open, examiner, guide, .. } = *self;
         let learner = std::mem::take(&mut self.learner);
-        *self = Self { open, examiner, guide, learner, ..Self::new(self.wake.clone()) };
+        *self = Self { open, examiner, guide, learner, ..Self::default() };
     }
 }
 
@@ -296,7 +274,7 @@ fn start(model: &mut Model, lesson: &mut Lesson, now: Instant) {
 }
 
 /// What is to be done, the guide, and the way to hand it in.
-fn during(ui: &mut Ui, model: &mut Model, lesson: &mut Lesson, now: Instant) {
+fn during(ui: &mut Ui, model: &mut Model, (lesson, wake): (&mut Lesson, &Wake), now: Instant) {
     let task = model.tasks[lesson.chosen].clone();
     ui.label(RichText::new(&task.name).strong());
     ui.label(&task.text);
@@ -332,7 +310,7 @@ fn during(ui: &mut Ui, model: &mut Model, lesson: &mut Lesson, now: Instant) {
                 learner: lesson.learner.trim().to_owned(),
                 folder: folder(),
             };
-            match marked(order, lesson.wake.clone()) {
+            match marked(order, wake.clone()) {
                 Ok(marking) => lesson.marking = Some(marking),
                 Err(problem) => lesson.problem = Some(problem.to_string()),
             }

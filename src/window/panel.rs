@@ -3,6 +3,7 @@
 //! A panel has its own state and asks the window for what is not its own, so that none knows of the others.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 use std::time::Instant;
 
 use egui::{Context, Key, Ui};
@@ -145,6 +146,9 @@ pub(super) struct DeviceFacts {
     pub(super) heap: u64,
 }
 
+/// A call, from any thread, by which the window looks at what has changed.
+pub(super) type Wake = Arc<dyn Fn() + Send + Sync>;
+
 /// What all panels share.
 pub(super) struct Common {
     /// The open panels.
@@ -161,6 +165,8 @@ pub(super) struct Common {
     pub(super) warnings: Vec<String>,
     /// True while these are shown.
     pub(super) warned: bool,
+    /// Called by threads of panels that have something to show.
+    pub(super) wake: Wake,
     /// What is asked of the window.
     pub(super) asks: Vec<Ask>,
 }

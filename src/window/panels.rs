@@ -14,6 +14,7 @@ use super::view3d::{self, View3dPanel};
 macro_rules! panels {
     ($($(#[$doc:meta])+ $field:ident: $of:ty = $row:expr;)+) => {
         /// The panels, with their state; what they show is not saved.
+        #[derive(Default)]
         pub(super) struct Panels {
             $($(#[$doc])+ pub(super) $field: $of,)+
         }

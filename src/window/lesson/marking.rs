@@ -1,7 +1,6 @@
 //! The score of an attempt, found on a thread of its own: structures that are to be seen take a frame.
 
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::thread;
 
@@ -9,6 +8,7 @@ use glam::DAffine3;
 
 use super::history::note;
 use crate::gpu::{Device, DeviceOptions, cache_folder};
+use crate::panel::Wake;
 use crate::scene::Scene;
 use crate::scene::animation::Track;
 use crate::scene::task::Goal;
@@ -54,7 +54,7 @@ impl Marking {
 }
 
 /// Begins to score; calls `wake` when the score is there.
-pub(super) fn marked(order: Order, wake: Arc<dyn Fn() + Send + Sync>) -> std::io::Result<Marking> {
+pub(super) fn marked(order: Order, wake: Wake) -> std::io::Result<Marking> {
     let (give, take) = channel();
     thread::Builder::new().name("marking".to_owned()).spawn(move || {
         // A window that is gone needs no score.

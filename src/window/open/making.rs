@@ -10,10 +10,8 @@ use winit::window::Window;
 use super::{Open, Plan, gestures};
 use crate::files::Files;
 use crate::gpu::{Device, ValidationLog};
-use crate::help::Help;
 use crate::inputs::{self, Inputs};
 use crate::keeper::Keeper;
-use crate::lesson::Lesson;
 use crate::link::Bell;
 use crate::model::{File, StoredTrajectory};
 use crate::opening::{self, Opened};
@@ -75,17 +73,7 @@ impl Open {
         }
         open.set(&gallery::ROW, plan.options.gallery);
         let state = State {
-            panels: Panels {
-                console: Default::default(),
-                view3d: Default::default(),
-                timing: Default::default(),
-                help: Help,
-                gallery: Default::default(),
-                lesson: Lesson::new(Arc::new(session::waker(plan.proxy.clone()))),
-                planes: Default::default(),
-                mmode: Default::default(),
-                exam: Default::default(),
-            },
+            panels: Panels::default(),
             common: Common {
                 open,
                 tools: plan.tools(&device),
@@ -99,6 +87,7 @@ impl Open {
                 },
                 warnings: plan.options.warnings.clone(),
                 warned: false,
+                wake: Arc::new(session::waker(plan.proxy.clone())),
                 asks: Vec::new(),
             },
             framing: Default::default(),
