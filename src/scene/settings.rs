@@ -11,6 +11,7 @@ mod group;
 mod imaging;
 mod key;
 mod probe;
+mod processing;
 mod simulation;
 pub mod suggest;
 mod surface;
@@ -27,6 +28,7 @@ pub(crate) use group::group;
 pub use imaging::{Imaging, Live, Machine};
 pub use key::{Facts, Form, Group, Off, Row};
 pub use probe::{Kind, MAX_ELEVATION_LAYERS, MAX_SCANLINES, Probe};
+pub use processing::Processing;
 pub use simulation::{
     Coherence, Loss, Quality, Refraction, Sampling, ScatterMode, Sequence, Simulation, TextureSpace,
 };
@@ -86,6 +88,8 @@ settings! {
     simulation: Simulation;
     /// Image formation.
     imaging: Imaging;
+    /// The display chain.
+    processing: Processing;
 }
 
 impl Settings {

@@ -24,7 +24,7 @@ use super::tissues::TissueKeys;
 use super::tracker::{MatrixKey, TrackerKeys};
 use super::vary::VaryKeys;
 use crate::settings::{
-    Display, Form, Fusion, Imaging, Live, Probe, Simulation, Surface, Tissue, group,
+    Display, Form, Fusion, Imaging, Live, Probe, Processing, Simulation, Surface, Tissue, group,
 };
 
 group! {
@@ -162,6 +162,7 @@ tables! {
     tissues: Named<Tissue>, "tissues.NAME": defaults::<TissueKeys>(""), keys::<Tissue>("", "");
     simulation: One<Simulation>, "simulation": defaults::<Simulation>("");
     imaging: One<Imaging>, "imaging": defaults::<Imaging>("");
+    processing: One<Processing>, "processing": defaults::<Processing>("");
     model: One<Size>, "model": defaults::<Size>(""), defaults::<Placed>("");
     volume: Maybe<Display>, "volume": defaults::<VolumeKeys>(""), defaults::<Cycle>(""), defaults::<Size>(""),
         defaults::<Placed>(""), keys::<Display>("", "");
