@@ -27,12 +27,7 @@ const int HEADROOM = int(ECHO_LIMIT);
 bool saturated(ivec2 v) { return any(greaterThanEqual(v, ivec2(HEADROOM))) || any(lessThanEqual(v, ivec2(-HEADROOM))); }
 
 #include "contact.glsl"
-
-// Lines on each side over which a Gaussian of this deviation smooths; it is cut there.
-int reach_of(float sigma) { return sigma < 0.05 ? 0 : int(min(ceil(3.0 * sigma), float(LATERAL_REACH))); }
-
-// Its exponent per line^2. Without smoothing that of the only tap, j = 0, is 0 whatever this is.
-float falloff_of(float sigma) { return -0.5 / max(sigma * sigma, 0.0025); }
+#include "smooth.glsl"
 
 void main() {
     uint k = gl_GlobalInvocationID.x;
@@ -42,7 +37,8 @@ void main() {
     if (k >= frame.samples) { return; }
 
     // Of surfaces, and of scatterers.
-    int surface_reach = reach_of(rows[k].lateral_lines), volume_reach = reach_of(rows[k].strip_lines);
+    int surface_reach = reach_of(rows[k].lateral_lines, LATERAL_REACH);
+    int volume_reach = reach_of(rows[k].strip_lines, LATERAL_REACH);
     vec2 falloff = vec2(falloff_of(rows[k].lateral_lines), falloff_of(rows[k].strip_lines));
     int reach_both = max(surface_reach, volume_reach);
 

@@ -83,6 +83,8 @@ subjects!(
     beam,
     axial,
     detect,
+    moments,
+    enhance,
     display,
     expect,
     label,

@@ -19,6 +19,7 @@ mod detect;
 mod difference;
 mod display;
 pub mod dump;
+mod enhance;
 mod expect;
 mod fuse;
 mod geometry;
@@ -27,6 +28,7 @@ mod interpolate;
 mod label;
 mod level;
 mod mask;
+mod moments;
 mod origin;
 mod rays;
 mod reduce;
@@ -296,7 +298,7 @@ impl Subject {
 }
 
 /// Every kernel of the image, in the order of a frame after the three that only tests use.
-pub const SUBJECTS: [Subject; 28] = [
+pub const SUBJECTS: [Subject; 30] = [
     angles::SUBJECT,
     geometry::SUBJECT,
     rays::SUBJECT,
@@ -310,6 +312,8 @@ pub const SUBJECTS: [Subject; 28] = [
     beam::SUBJECT,
     axial::SUBJECT,
     detect::SUBJECT,
+    moments::SUBJECT,
+    enhance::SUBJECT,
     display::SUBJECT,
     expect::SUBJECT,
     label::SUBJECT,

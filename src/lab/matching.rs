@@ -22,7 +22,7 @@ pub use adjust::Adjusted;
 use adjust::{change, common, halfway, proposal};
 use band::Band;
 use statistics::Gathered;
-pub use statistics::{Level, SPECKLE_DEVIATION, Statistics, Width, depths};
+pub use statistics::{Level, Statistics, Width, depths};
 
 /// Changes smaller than these are not made, so that a second matching changes
 /// nothing: level in dB, dynamic range and sizes relative. All are finer than the precision of statistics

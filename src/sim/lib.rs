@@ -265,6 +265,10 @@ impl Simulator {
         passes.echoes(&mut cmd, levelled)?;
         passes.run(&mut cmd, &BEAM)?;
         passes.run(&mut cmd, &AXIAL)?;
+        // A line alone has too few beside it.
+        if line.is_none() && scene.processing.is_on() {
+            passes.enhance(&mut cmd, &scene.processing)?;
+        }
         // From here on the frame is not abandoned, so that the picture is replaced as a whole.
         cmd.keep_on();
         let fusion = scene.fusion.as_ref().filter(|_| line.is_none() && scene.shows_volume());

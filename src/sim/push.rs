@@ -67,6 +67,22 @@ push! {
         /// Number of nodes.
         count: u32,
     }
+    /// The neighbourhood whose moments are found.
+    "moments" Moments {
+        /// Its standard deviation over that of the point-spread function.
+        neighbourhood: f32,
+    }
+    /// The display chain.
+    "enhance" Enhance {
+        /// Standard deviation of the neighbourhood over that of the point-spread function.
+        neighbourhood: f32,
+        /// Share of the speckle that is smoothed away, 0 to 1.
+        speckle_reduction: f32,
+        /// Factor on the difference from the neighbourhood's mean, less 1.
+        edge_enhancement: f32,
+        /// Variance of fully developed speckle, squared levels.
+        speckle: f32,
+    }
     /// A level of the pyramid of differences.
     "collapse" Collapse {
         /// Width of the finer level, pixels.

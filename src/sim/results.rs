@@ -92,7 +92,7 @@ impl Simulator {
         self.floats(&axial::IQ)
     }
 
-    /// Log-compressed envelope, 0..1: [L][K].
+    /// Log-compressed envelope, as the display chain leaves it, 0..1: [L][K].
     ///
     /// # Errors
     /// A Vulkan error.

@@ -9,6 +9,7 @@ pub use blur::BLUR;
 pub use chart::CHART;
 pub use convert::CONVERT;
 pub use display::DISPLAY;
+pub use enhance::ENHANCE;
 pub use expect::{EXPECT, LEVEL};
 pub use fuse::FUSE;
 pub use inputs::{ANATOMY, INPUTS};
@@ -30,6 +31,7 @@ pub mod blur;
 pub mod chart;
 pub mod convert;
 pub mod display;
+pub mod enhance;
 pub mod expect;
 pub mod fuse;
 pub mod inputs;
@@ -44,9 +46,20 @@ pub mod tiles;
 pub mod tint;
 pub mod trace;
 
-/// Stages of every frame, in order.
-pub const IMAGE: [&Pass; 9] =
-    [&ORIGIN, &TRACE[0], &TRACE[1], &APERTURE, &TRACE[2], &SCATTER, &BEAM, &AXIAL, &DISPLAY];
+/// Stages of the simulated image, in order.
+pub const IMAGE: [&Pass; 11] = [
+    &ORIGIN,
+    &TRACE[0],
+    &TRACE[1],
+    &APERTURE,
+    &TRACE[2],
+    &SCATTER,
+    &BEAM,
+    &AXIAL,
+    &ENHANCE[0],
+    &ENHANCE[1],
+    &DISPLAY,
+];
 
 /// Stages of frames that have labels, in order; the first after each [`SCATTER`].
 pub const LABELS: [&Pass; 4] = [&EXPECT, &LABEL, &LEVEL, &CHART];

@@ -5,6 +5,7 @@
 mod apertures;
 mod border;
 mod brightness;
+mod chain;
 pub mod check;
 mod cole;
 mod contrast;

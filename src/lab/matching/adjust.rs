@@ -1,8 +1,9 @@
 //! The settings that make two bands alike, from the statistics of both.
 
-use super::statistics::{SPECKLE_DEVIATION, Statistics, depths};
+use super::statistics::{Statistics, depths};
 use crate::probe::Probe;
 use crate::scene::Imaging;
+use crate::sim::stages::enhance::SPECKLE_DEVIATION;
 
 /// Expected standard deviation of the difference of two neighbouring sliders, and, doubled, of the
 /// difference of a slider from the mean of its neighbours; dB. A scanner's sliders are set to a gentle

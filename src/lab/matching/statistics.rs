@@ -15,6 +15,7 @@
 
 use super::histogram::Histogram;
 use crate::probe::Probe;
+use crate::sim::stages::enhance::SPECKLE_DEVIATION;
 
 /// Begin and end of the far distances, half widths of the correlation. A Gaussian correlation has fallen to
 /// 2^-9 at the first; up to the second, anatomy has changed little.
@@ -32,10 +33,6 @@ const LAG_CLASS: f64 = 0.25;
 /// Least length of a depth interval over which brightness is measured, mm; and the largest number of intervals.
 const DEPTH_INTERVALS: (f64, usize) = (2.0, 40);
 
-/// Standard deviation of fully developed speckle after log compression, dB: 20 / ln 10 * pi / sqrt(24)
-/// (Burckhardt, IEEE Trans. Sonics Ultrason. 25, 1978; Dutt and Greenleaf, IEEE Trans. Ultrason.
-/// Ferroelectr. Freq. Control 43, 1996).
-pub const SPECKLE_DEVIATION: f64 = 5.57;
 /// Mean of the middle half of |difference| of two independent samples of such speckle, dB. Intensities
 /// are exponential, the difference of two log intensities logistic, with quantiles 2 artanh(p) of its
 /// magnitude: 10 / ln 10 * 4 (p artanh p + ln(1 - p^2) / 2) from p = 1/4 to 3/4.
