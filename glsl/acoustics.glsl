@@ -14,6 +14,7 @@ float reflection(float z1, float c1, float z2, float c2, float cos_i) {
 }
 
 // Snell's law by sound speeds: sin(t) / c2 = sin(i) / c1. False at total reflection.
+// Starkov et al. 2019, II-A: the law by which a ray of figure 5 goes on.
 bool refraction(vec3 d, vec3 n, float c1, float c2, out vec3 transmitted) {
     float k = c2 / c1;
     float cos_i = -dot(d, n);
@@ -56,6 +57,7 @@ bool is_mirror(vec3 d, vec3 m, vec3 n_geometric) {
 
 // Micro-normal about n whose reflection leaves on the near side of the geometric normal: pdf
 // (s+1)/(2 pi) cos^s. False when eight attempts fail.
+// Starkov et al. 2019, II-A: the surface normal that is drawn at every intersection.
 bool rough_normal(vec3 d, vec3 n, vec3 n_geometric, float roughness, uint path, uint key, uint seed, bool sobol, out vec3 m) {
     if (roughness >= SPECULAR) {
         m = n;

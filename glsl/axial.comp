@@ -17,6 +17,8 @@ layout(std430, binding = 4) restrict buffer LogBuffer { float log_image[]; };
 
 const float DECIBEL_PER_OCTAVE = 6.020599913; // 20 log10(2)
 
+// Starkov et al. 2019, II-A, image formation: the axial part of a separable point-spread function, and the envelope of the sum of surface
+// and scatterer echoes.
 void main() {
     int samples = int(frame.samples);
     int first = int(gl_GlobalInvocationID.x) * AXIAL_SAMPLES;

@@ -29,6 +29,7 @@ float acquired_level(Around a) {
     return mix(near, far, a.beyond.y);
 }
 
+// Starkov et al. 2019, II-C: I(x) = M(x) I_b(x) + (1 - M(x)) I_f(x), with the blurred mask M, background I_b and foreground I_f.
 float mixed_level(Raster of, vec2 column_row, uint tile, uint pixel) {
     if (fusion.blend == BLEND_MULTIBAND) { return background[pixel] + change[pixel]; }
     Around a = around(of, column_row);

@@ -104,6 +104,8 @@ bool bvh_bounds_met(uint instance, BvhRay ray, float t_min, float t_max) {
 // The first surface with t_min < t < t_max along origin + t direction, world space; direction need
 // not be a unit vector. All of `skip_instance` is transparent; NONE: nothing is.
 // Miss: instance NONE, t = t_max. An invalid ray (not finite, no direction, t_min < 0) misses.
+// Starkov et al. 2019, II-B: an instance is met by the inverse transform of the ray (figure 9); that of a selector has the union of its
+// children's boxes, and its row names the root of the one that is shown (figure 8).
 Hit closest_hit(vec3 origin, vec3 direction, float t_min, float t_max, uint skip_instance) {
     Hit hit = Hit(t_max, NONE, NONE, 0.0, 0.0);
     uint root = nodes[0].x;

@@ -100,6 +100,7 @@ uint block_has(uint block) {
     return has;
 }
 
+// Starkov et al. 2019, II-C: the kernel that goes straight through the masking geometry and looks up the volume.
 void main() {
     uint line = gl_WorkGroupID.x;
     vec3 o, d, lateral;

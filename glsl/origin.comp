@@ -129,6 +129,7 @@ void enclose(inout Media media) {
     }
 }
 
+// Starkov et al. 2019, II-C, figure 11: what lies in front of the outermost anatomy costs depth and energy alone.
 void write_start(uint line, inout Media media, float travelled, float weight, uint interactions) {
     uint base = line * START_WORDS;
     stacks[base] = media.count;

@@ -95,6 +95,7 @@ void reflect_path(inout Path path, vec3 m, float roughness, float turn) {
 }
 
 // Moves the path along its segment: attenuation, time, widening.
+// Starkov et al. 2019, II-A: attenuation by Beer and Lambert.
 void advance(inout Path path, float t, Medium medium, vec3 position) {
     path.weight *= exp(-medium.absorption * t);
     path.time += t / medium.speed;

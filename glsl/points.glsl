@@ -1,6 +1,7 @@
 // Samples of the voxel grid, and point targets, along a stretch: part of scatter.comp, which declares what is used here.
 
 // Echo of one equally spaced sample looked up in the voxel grid; the jitter decorrelates the grid from the carrier.
+// Starkov et al. 2019, II-A, figure 6: samples by the segment's speed of sound and the sampling rate, and the scatterers there.
 uvec3 march_sample(Stretch s, int k) {
     float x = distance_at(s, float(k));
     if (!(x >= 0.0 && x < s.extent)) return uvec3(0u);

@@ -1,6 +1,7 @@
 // The share of the acquired image in a pixel, from 0 to 1: the mask, blurred, through the blend's curve. The includer
 // declares fusion and sums[], and includes tiles.glsl.
 
+// Starkov et al. 2019, II-C, figure 10: the scan-converted mask blurred by a box.
 float acquired_share(uint tile, uint pixel) {
     uint seen = tile & (TILE_ACQUIRED | TILE_SIMULATED);
     if (seen == TILE_ACQUIRED) return 1.0;

@@ -27,6 +27,7 @@ float value_noise(vec3 p, uint seed) {
 }
 
 // Variance of one octave: (26/35)^3 of smoothstep weights, 1/3 of the values; 5/4 for both octaves.
+// Starkov et al. 2019, III-A: scatterer texture of high and of low frequency.
 float tissue_texture(vec3 p, uint seed) {
     return (value_noise(p, seed) + 0.5 * value_noise(2.0 * p + 17.0, seed)) / 0.41329;
 }

@@ -153,6 +153,7 @@ void transmit(inout Path path, inout Interface at, vec3 n) {
     copy_media(media, after);
 }
 
+// Starkov et al. 2019, II-A, figure 5: with SAMPLING_PLAIN one of the reflected and the refracted ray is drawn at every surface.
 void main() {
     // Sets the other counter to zero for the next dispatch.
     if (gl_GlobalInvocationID.x == 0u) {
