@@ -28,6 +28,7 @@ mod files;
 mod framing;
 mod gallery;
 mod help;
+mod histogram;
 mod hold;
 mod inputs;
 mod keeper;

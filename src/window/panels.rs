@@ -4,6 +4,7 @@ use super::console::{self, Console};
 use super::exam::{self, Examination};
 use super::gallery::{self, Gallery};
 use super::help::{self, Help};
+use super::histogram::{self, Histogram};
 use super::lesson::{self, Lesson};
 use super::mmode::{self, MmodePanel};
 use super::panel::{Panel, Row};
@@ -38,6 +39,8 @@ panels! {
     view3d: View3dPanel = view3d::ROW;
     /// Where the time goes.
     timing: Timing = timing::ROW;
+    /// Greys and speckle of regions.
+    histogram: Histogram = histogram::ROW;
     /// The keys.
     help: Help = help::ROW;
     /// Pictures of the scenes that ship.
