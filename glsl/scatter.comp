@@ -38,6 +38,7 @@ const bool DEFORMING = false;
 #include "field.glsl"
 #include "texture.glsl"
 #include "deposit.glsl"
+#include "alone.glsl"
 
 const uint THREADS = 64u;
 const float POINT_SHIFT = 0.01234;   // shift of the layers' borders, in their pitch
@@ -328,8 +329,8 @@ ivec2 work_of(Stretch s, bool voxel) {
     }
     ivec2 passed = bins_of(s);
     int window = int(window_begin / SCATTER_BIN);
-    int first = max(passed.x, window - BESIDE);
-    int last = min(passed.y, window + int(BINS) + BESIDE - 1);
+    int first = max(passed.x, max(window, first_heard / int(SCATTER_BIN)) - BESIDE);
+    int last = min(passed.y, min(window + int(BINS) - 1, last_heard / int(SCATTER_BIN)) + BESIDE);
     int items = int(items_of(s));
     return ivec2(first * items, max(last - first + 1, 0) * items);
 }
@@ -351,9 +352,11 @@ void main() {
     if (thread == 0u) {
         shared_candidates = 0u;
         shared_deposits = 0u;
+        begin_heard();
         for (uint i = 1u; i < frame.layers; ++i) line_end[i] += line_end[i - 1u];
     }
     barrier();
+    find_heard(scanline, thread, THREADS);
     uint available = line_end[frame.layers - 1u];
 
     // Masking: the level of the loudest stretch in each slot, of all layers.
