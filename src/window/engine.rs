@@ -6,14 +6,17 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use glam::DAffine3;
 use parking_lot::{Condvar, Mutex, MutexGuard};
 
 use super::deaths::SIMULATION;
 use super::link::Link;
 use super::look::{Look, Pictured};
-use super::model::Order;
+use super::model::mmode::{Aim, Column};
+use super::model::{Order, Settings};
 use super::picture::{Film, Frame};
 use crate::gpu::Device;
+use crate::probe::Probe;
 use crate::scene::Scene;
 use crate::sim::SimError;
 use crate::sim::shaders::Library;
@@ -25,6 +28,13 @@ mod worker;
 /// the next one: it gets a seventh of the time.
 const VIEW3D_PUT_OFF: u32 = 6;
 
+/// While the M-mode strip of a moving scene is drawn, the next image waits this many times the duration of the last one:
+/// the strip gets seven eighths of the time, as on scanners, whose image then stands for a second at a time.
+const STRIP_PUT_OFF: u32 = 7;
+
+/// Longest time for which the image stands beside the strip.
+const STRIP_LONGEST: Duration = Duration::from_secs(1);
+
 /// Longest wait of the next image for the window to draw the last one, where they share a queue: neither then
 /// slows the other, and the image contains the newest input. A window that takes longer is not waited for until it
 /// draws again.
@@ -34,6 +44,10 @@ const WINDOW_PATIENCE: Duration = Duration::from_millis(40);
 pub enum News {
     /// A picture, and what the M-mode strip takes with it.
     Frame(Box<Frame>, Film),
+    /// Columns along a line for the M-mode strip, between two pictures, and the probe that they were made with.
+    Columns(Box<Probe>, Aim, Vec<Column>),
+    /// A picture of a past moment at the scene's own quality, in place of that of the loop.
+    Anew(Box<Frame>),
     /// A picture of the anatomy.
     View3d(Box<Pictured>),
     /// The work under way before the first picture.
@@ -53,9 +67,22 @@ pub enum News {
 /// Tells the window that there is news.
 type Wake = Arc<dyn Fn() + Send + Sync>;
 
+/// An image of the loop that is looked at: made again at the scene's own quality.
+#[derive(Clone, PartialEq)]
+pub(super) struct Past {
+    /// The settings that it was made with.
+    pub(super) settings: Arc<Settings>,
+    /// World from probe.
+    pub(super) pose: DAffine3,
+    /// Time of the scene, s.
+    pub(super) seconds: f64,
+}
+
 struct State {
     /// The newest order, not yet taken.
     order: Option<Order>,
+    /// The image of the loop that is looked at, while the image is frozen.
+    past: Option<Past>,
     /// A scene to open, and the first order for it.
     opening: Option<(Box<Scene>, Order)>,
     frozen: bool,
@@ -77,9 +104,13 @@ struct State {
 enum Job {
     /// An image.
     Image(Order),
+    /// Columns of the M-mode strip.
+    Columns(Order),
     Open(Box<Scene>, Order),
     /// The last image once more, at a finer level.
     Refined(usize),
+    /// An image of the loop.
+    Anew(Past),
     /// A picture of the 3D view.
     View3d {
         moving: bool,
@@ -126,6 +157,7 @@ impl Engine {
         let shared = Arc::new(Shared {
             state: Mutex::new(State {
                 order: Some(order),
+                past: None,
                 opening: None,
                 frozen: false,
                 look: None,
@@ -158,6 +190,15 @@ impl Engine {
         state.order = Some(order);
         state.frozen = frozen;
         self.shared.interrupt(state);
+    }
+
+    /// Sets the image of the loop that is looked at: it is made again once the user has stopped there.
+    pub(super) fn look_back(&self, past: Option<Past>) {
+        let mut state = self.shared.state.lock();
+        if state.past != past {
+            state.past = past;
+            self.shared.interrupt(state);
+        }
     }
 
     /// Goes on with another scene, if the device can hold it beside the one before.

@@ -3,7 +3,7 @@
 
 use std::time::Instant;
 
-use egui::{Align2, FontId, Grid, Pos2, Rect, ScrollArea, Sense, Ui, vec2};
+use egui::{Align2, FontId, Grid, Key, Pos2, Rect, ScrollArea, Sense, Ui, vec2};
 use glam::{DVec2, dvec2};
 
 use super::model::calipers::{Caliper, Kind};
@@ -13,13 +13,13 @@ use super::picture::Frame;
 use super::style;
 use crate::settings::Imaging;
 
-/// Its row in the list of panels.
+/// Its row in the list of panels. A key opens it: the bar has room for no more buttons.
 pub(super) const ROW: Row = Row {
     name: "Histogram",
     tip: "Greys of the image and of the regions that are marked on it, and their speckle",
-    key: None,
+    key: Some((Key::F4, "F4")),
     dock: Dock::Below { height: 168.0, alone: false },
-    has_button: true,
+    has_button: false,
 };
 
 /// Number of greys.

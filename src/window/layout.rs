@@ -18,7 +18,7 @@ use super::{
 use crate::settings::Exam;
 
 /// Width of the loop's controls, points.
-const LOOP: f32 = 560.0;
+const LOOP: f32 = 565.0;
 
 /// Least height that is left to the image beside a panel of timings, and least width beside the worksheet, points.
 const LEAST_IMAGE: f32 = 200.0;

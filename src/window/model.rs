@@ -39,7 +39,7 @@ pub use devices::{Devices, Source};
 use history::History;
 use hold::Hold;
 pub use layer::Layer;
-use mmode::{Aim, Strip};
+use mmode::{Aim, Column, Strip};
 pub use pad::{Control, Pad, Press};
 pub use pose::{Axis, STEP, moved};
 pub use poses::KnownPose;
@@ -55,6 +55,7 @@ pub use trajectory_state::{StoredTrajectory, TrajectoryState};
 pub use view3d::{Shown, View3d};
 
 use super::picture::{Film, Frame};
+use crate::probe::Probe;
 use crate::scene::{NamedPose, Scene, Task};
 use crate::sim::Tracer;
 use crate::sim::fusion::Tint;
@@ -171,6 +172,11 @@ impl Order {
             Some(replay) => replay.pose(&self.clock, now),
             None => self.pose,
         }
+    }
+
+    /// The same order for an image with other settings, none of whose lines the M-mode strip takes.
+    pub fn with(&self, settings: Settings) -> Self {
+        Self { settings, mmode: None, ..self.clone() }
     }
 
     /// The same order, decided at `at`.
@@ -320,25 +326,30 @@ impl Model {
     /// Adds a picture to the M-mode strip, if it is drawn. Where nothing in the scene moves, the strip's
     /// time is that of the pictures: only the probe moves then.
     pub fn film(&mut self, frame: &Frame, film: Film) {
-        let (animated, opened) = (self.animated, self.opened);
-        let time = |seconds: f64, at: Instant| match animated {
-            true => seconds,
-            false => at.duration_since(opened).as_secs_f64(),
-        };
-        let Some(strip) = &mut self.mmode else { return };
-        match film {
-            Film::None => {}
-            Film::Picture(pixels) => {
-                let seconds = time(frame.seconds, frame.at);
+        let seconds = self.strip_time(frame.seconds, frame.at);
+        match (film, &mut self.mmode) {
+            (Film::Picture(pixels), Some(strip)) => {
                 strip.add_image(seconds, &frame.probe, frame.sector, &pixels);
             }
-            // Those of the line before come to nothing.
-            Film::Columns(aim, _) if aim != strip.line() => {}
-            Film::Columns(_, columns) => {
-                for column in columns {
-                    strip.add(time(column.seconds, column.at), &frame.probe, column.levels);
-                }
-            }
+            (Film::Columns(aim, columns), _) => self.film_columns(&frame.probe, aim, columns),
+            _ => {}
+        }
+    }
+
+    /// Adds columns along a line to the M-mode strip, if it is drawn; those of the line before come to nothing.
+    pub fn film_columns(&mut self, probe: &Probe, aim: Aim, columns: Vec<Column>) {
+        let timed: Vec<f64> = columns.iter().map(|c| self.strip_time(c.seconds, c.at)).collect();
+        if let Some(strip) = self.mmode.as_mut().filter(|strip| strip.line() == aim) {
+            let columns = timed.into_iter().zip(columns);
+            columns.for_each(|(seconds, column)| strip.add(seconds, probe, column.levels));
+        }
+    }
+
+    /// The strip's time at a moment.
+    fn strip_time(&self, seconds: f64, at: Instant) -> f64 {
+        match self.animated {
+            true => seconds,
+            false => at.duration_since(self.opened).as_secs_f64(),
         }
     }
 

@@ -124,6 +124,13 @@ impl Open {
                     self.unseen += u64::from(std::mem::replace(&mut self.fresh, true));
                     self.state.problem = None;
                 }
+                News::Columns(probe, aim, columns) => {
+                    self.model.film_columns(&probe, aim, columns);
+                }
+                News::Anew(frame) => {
+                    self.state.common.tools.put_back(&frame);
+                    self.state.dual.refine(&frame);
+                }
                 News::View3d(pictured) => {
                     self.pictures_ms.push(pictured.ms);
                     self.state.panels.view3d.learn(&pictured);

@@ -9,6 +9,7 @@ use glam::{DAffine3, DVec2};
 use serde_json::{Value, json};
 
 use super::captures::{self, Captures, Clip, Format, SavedStrip, Sidecar, Still};
+use super::engine::Past;
 use super::model::cine::Limit;
 use super::model::sheet::{Mark, Marks, Moment, Sheet};
 use super::model::sidecar;
@@ -95,13 +96,25 @@ impl Tools {
         if self.cine.newest().is_some_and(|last| !is_like(last)) {
             self.cine.clear();
         }
-        let images = [Some(&frame.image), frame.tinted.as_ref(), frame.painted.as_ref()];
-        let bytes = images.into_iter().flatten().map(Image::bytes).sum();
-        let at = frame.finished;
+        let (bytes, at) = (bytes(&frame), frame.finished);
         match frame.grade.at_rest && !self.cine.is_empty() {
             true => self.cine.replace_newest(frame, bytes),
             false => self.cine.push(frame, bytes, at),
         }
+    }
+
+    /// Puts an image that was made again into the place that it has in the loop.
+    pub(super) fn put_back(&mut self, frame: &Frame) {
+        let is =
+            |other: &Frame| other.moment() == frame.moment() && *other.settings == *frame.settings;
+        self.cine.replace(is, frame, bytes(frame));
+    }
+
+    /// The image of the loop at which the user has stopped.
+    pub(super) fn stopped_at(&self, model: &Model) -> Option<Past> {
+        let frame = self.cine.shown().filter(|_| model.frozen && !self.cine.is_playing())?;
+        let settings = frame.settings.clone();
+        Some(Past { settings, pose: frame.pose, seconds: frame.seconds })
     }
 
     /// The image to be shown now: live the newest; frozen, the chosen or the playing one.
@@ -315,6 +328,12 @@ impl Tools {
         self.captures.wait();
         self.cine.clear();
     }
+}
+
+/// Bytes of the pictures of a frame.
+fn bytes(frame: &Frame) -> u64 {
+    let images = [Some(&frame.image), frame.tinted.as_ref(), frame.painted.as_ref()];
+    images.into_iter().flatten().map(Image::bytes).sum()
 }
 
 /// Keys of the scene file to replace for the same frame, as `--set` takes them, and the settings in full.

@@ -13,7 +13,7 @@ use super::tools::sidecar;
 use super::{brightness, difference};
 
 /// A ball of bone that goes 6 mm up and down every second below a linear probe.
-const SCENE: &str = r#"
+pub const SCENE: &str = r#"
 name = "Ball"
 background = "water"
 

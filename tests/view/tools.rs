@@ -36,14 +36,20 @@ pub fn sidecar(desk: &mut Desk, folder: &Path, name: &str) -> Value {
 /// The picture of the scene that `insonify render` makes in a folder, with the device and the tracer of a still's
 /// sidecar: the window's device is one that can show pictures, `render` alone would take the best.
 pub fn rendered(folder: &Path, still: &Value) -> image::DynamicImage {
+    rendered_of(SCENE, folder, still)
+}
+
+/// The same of another scene, at the still's time.
+pub fn rendered_of(text: &str, folder: &Path, still: &Value) -> image::DynamicImage {
     let (scene, picture) = (folder.join("scene.toml"), folder.join("rendered.png"));
-    std::fs::write(&scene, SCENE).expect("written");
+    std::fs::write(&scene, text).expect("written");
     let devices = list_devices().expect("devices").devices;
     let shown = devices.iter().find(|d| still["device"] == format!("{} ({})", d.name, d.driver));
     let device = shown.expect("the window's device").index.to_string();
     let tracer = still["tracer"].as_str().expect("a tracer");
     let status = std::process::Command::new(env!("CARGO_BIN_EXE_insonify"))
-        .args(["render", "--device", &device, "--tracer", tracer, "-o"])
+        .args(["render", "--time", &still["time_s"].to_string()])
+        .args(["--device", &device, "--tracer", tracer, "-o"])
         .args([&picture, &scene])
         .stdout(std::process::Stdio::null())
         .status()

@@ -10,11 +10,15 @@ use std::time::{Duration, Instant};
 use glam::DAffine3;
 use parking_lot::MutexGuard;
 
-use super::{Job, News, Shared, State, VIEW3D_PUT_OFF, WINDOW_PATIENCE, Wake};
+use super::{
+    Job, News, Past, STRIP_LONGEST, STRIP_PUT_OFF, Shared, State, VIEW3D_PUT_OFF, WINDOW_PATIENCE,
+    Wake,
+};
 use crate::gpu::{Device, GpuError};
 use crate::link::{Broadcast, Link};
 use crate::live::{self, Pace};
 use crate::model::{Order, Settings};
+use crate::picture::Film;
 use crate::ring::Ring;
 use crate::scene::Scene;
 use crate::sim::shaders::Library;
@@ -31,6 +35,14 @@ struct Imaged {
     level: usize,
 }
 
+impl Imaged {
+    /// Returns whether it shows an image of the loop.
+    fn shows(&self, past: &Past) -> bool {
+        (self.pose, self.seconds) == (past.pose, past.seconds)
+            && self.order.settings == *past.settings
+    }
+}
+
 /// The contents of an image to be made.
 struct Taken {
     order: Order,
@@ -39,6 +51,8 @@ struct Taken {
     seconds: f64,
     /// Level of the ladder; none leaves it to the pace.
     level: Option<usize>,
+    /// True for an image of the loop, made again.
+    past: bool,
     /// Moment at which they were decided.
     at: Instant,
 }
@@ -56,6 +70,8 @@ pub(super) struct Worker {
     fitted: Option<Arc<Settings>>,
     /// Start of the last picture made for something new; finer ones of it follow at once.
     imaged: Instant,
+    /// Duration of that picture.
+    took: Duration,
     /// The last order carried out, or tried.
     last: Option<Order>,
     /// The state that the last picture left on the device.
@@ -89,6 +105,7 @@ impl Worker {
             scene,
             fitted: None,
             imaged: Instant::now(),
+            took: Duration::ZERO,
             last: None,
             left: None,
             pace: Pace::new(machine),
@@ -111,6 +128,21 @@ impl Worker {
                     continue;
                 }
                 Job::Image(order) => self.taken(order, index),
+                Job::Columns(order) => {
+                    let taken = self.taken(order, index);
+                    let columns = self.columns(&mut simulator, &taken);
+                    let told = columns.map(|film| match film {
+                        Some(Film::Columns(aim, columns)) => {
+                            let probe = taken.order.settings.probe.clone();
+                            News::Columns(Box::new(probe), aim, columns)
+                        }
+                        _ => unreachable!("those of a scanline"),
+                    });
+                    if !self.report(told, false) {
+                        return;
+                    }
+                    continue;
+                }
                 Job::Refined(level) => match &self.left {
                     Some(left) => Taken {
                         order: left.order.clone(),
@@ -118,6 +150,19 @@ impl Worker {
                         pose: left.pose,
                         seconds: left.seconds,
                         level: Some(level),
+                        past: false,
+                        at: Instant::now(),
+                    },
+                    None => continue,
+                },
+                Job::Anew(past) => match &self.left {
+                    Some(left) => Taken {
+                        order: left.order.with((*past.settings).clone()),
+                        index: left.index,
+                        pose: past.pose,
+                        seconds: past.seconds,
+                        level: Some(0),
+                        past: true,
                         at: Instant::now(),
                     },
                     None => continue,
@@ -146,10 +191,16 @@ impl Worker {
                 (Err(_), Some(left)) => left.level = 0,
                 _ => {}
             }
+            if taken.past && frame.is_err() {
+                self.shared.state.lock().past = None;
+            }
             if taken.level.is_none() {
                 self.last = Some(taken.order);
             }
-            let told = frame.map(|(frame, film)| News::Frame(Box::new(frame), film));
+            let told = frame.map(|(frame, film)| match taken.past {
+                true => News::Anew(Box::new(frame)),
+                false => News::Frame(Box::new(frame), film),
+            });
             if !self.report(told, simulator.is_none()) {
                 return;
             }
@@ -186,7 +237,7 @@ impl Worker {
     fn taken(&self, order: Order, index: u32) -> Taken {
         let now = Instant::now();
         let (pose, seconds) = (order.pose(now), order.clock.at(now));
-        Taken { pose, seconds, order, index, level: None, at: now }
+        Taken { pose, seconds, order, index, level: None, past: false, at: now }
     }
 
     /// Hands news over; returns whether there will be more.
@@ -246,10 +297,15 @@ impl Worker {
             let due = !state.frozen && (state.order.is_some() || running.is_some());
             let finer = left.and_then(|left| self.pace.refined(left.level));
             let finer = finer.filter(|_| !due);
+            let past = state.past.as_ref().filter(|_| state.frozen && !due);
+            let past = past.filter(|past| left.is_some_and(|left| !left.shows(past)));
             let touched = state.touched.elapsed();
             let quiet = touched.min(self.imaged.elapsed());
-            if let Some(level) = finer.filter(|_| quiet >= live::REST) {
-                return Some(Job::Refined(level));
+            if quiet >= live::REST {
+                let finer = finer.map(Job::Refined);
+                if let Some(job) = past.cloned().map(Job::Anew).or(finer) {
+                    return Some(job);
+                }
             }
             // While something moves the next order is about to come: a job begun before would be in its way.
             let moving = due || touched < live::REST;
@@ -263,10 +319,18 @@ impl Worker {
                 return Some(Job::View3d { moving });
             }
             if due {
-                let again = || running.expect("an order, or a running one").again(Instant::now());
-                return Some(Job::Image(state.order.take().unwrap_or_else(again)));
+                if let Some(order) = state.order.take() {
+                    return Some(Job::Image(order));
+                }
+                let again = running.expect("an order, or a running one").again(Instant::now());
+                let stands = (STRIP_PUT_OFF * self.took).min(STRIP_LONGEST);
+                return Some(match self.has_columns(&again) && self.imaged.elapsed() < stands {
+                    true => Job::Columns(again),
+                    false => Job::Image(again),
+                });
             }
-            let rest = finer.map(|_| live::REST - quiet);
+            let waits = finer.is_some() || past.is_some();
+            let rest = waits.then(|| live::REST.saturating_sub(quiet));
             let look = looks.then(|| put_off.min(live::REST.saturating_sub(touched)));
             self.wait(&mut state, rest.into_iter().chain(look).min());
         }

@@ -83,6 +83,20 @@ impl<T> Cine<T> {
         }
     }
 
+    /// Replaces those frames that `is` says of by one of so many bytes.
+    pub fn replace(&mut self, is: impl Fn(&T) -> bool, frame: &T, bytes: u64)
+    where
+        T: Clone,
+    {
+        for taken in self.frames.iter_mut().filter(|taken| is(&taken.frame)) {
+            self.bytes = self.bytes - taken.bytes + bytes;
+            (taken.frame, taken.bytes) = (frame.clone(), bytes);
+        }
+        while self.frames.len() > 1 && self.is_too_large() {
+            self.drop_oldest();
+        }
+    }
+
     fn drop_oldest(&mut self) {
         let dropped = self.frames.pop_front().expect("more than one");
         self.bytes -= dropped.bytes;

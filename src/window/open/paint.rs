@@ -40,6 +40,8 @@ impl Open {
             }));
         }
         self.tell();
+        let stopped = self.state.common.tools.stopped_at(&self.model);
+        self.session.engine.look_back(stopped);
         self.point(&places, output.pixels_per_point);
         self.entitle();
         let platform = std::mem::take(&mut output.platform_output);

@@ -3,6 +3,7 @@
 use std::time::{Duration, Instant};
 
 use super::{Taken, Worker};
+use crate::model::Order;
 use crate::model::mmode::{Aim, Column, RATE, ROWS};
 use crate::picture::Film;
 use crate::sim::{SimError, Simulator, Tracer, image_size, machine};
@@ -38,6 +39,14 @@ impl Columns {
 }
 
 impl Worker {
+    /// Returns whether an order's M-mode strip has columns of its own: along a scanline. A picture is mixed with the
+    /// volume; a scanline of its own is not.
+    pub(super) fn has_columns(&self, order: &Order) -> bool {
+        let [width, height] = image_size(&self.scene);
+        let along = matches!(order.mmode, Some(Aim::Scanline(_)));
+        along && !self.scene.shows_volume() && width * height >= ROWS as u32
+    }
+
     /// What the M-mode strip gets with the picture `taken`, but for the pixels of that: columns of their own, as
     /// close as takes no longer than a picture may. None where they are taken from the picture.
     pub(super) fn columns(
@@ -50,10 +59,8 @@ impl Worker {
             return Ok(Some(Film::None));
         };
         self.adapt(order);
-        let [width, height] = image_size(&self.scene);
         let Aim::Scanline(line) = aim else { return Ok(None) };
-        // A picture is mixed with the volume; a scanline of its own is not.
-        if self.scene.shows_volume() || width * height < ROWS as u32 {
+        if !self.has_columns(order) {
             return Ok(None);
         }
         let now = taken.at;

@@ -159,6 +159,9 @@ impl Worker {
         simulator.frames_into(scene, &[Shot::of(scene, index)], &outputs)?;
         let timings = simulator.wait()?.pop().unwrap_or_default();
         let wall = began.elapsed();
+        if !at_rest {
+            self.took = wall;
+        }
         // The very first frame includes kernels that the driver compiles late.
         if self.left.is_some() {
             self.pace.finished(level, (wall - prepared).as_secs_f64() * 1e3);
@@ -179,7 +182,9 @@ impl Worker {
             Film::Picture(pixels) => Some(pixels.rgba.as_slice()),
             _ => None,
         };
-        self.broadcast.offer(&image, rgba, constants, pose)?;
+        if !taken.past {
+            self.broadcast.offer(&image, rgba, constants, pose)?;
+        }
         let frame = Frame {
             sector: Sector {
                 left: f64::from(constants.image_left),
