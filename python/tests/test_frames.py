@@ -173,12 +173,30 @@ def test_a_live_mesh_is_imaged_as_one_that_is_so_from_the_start(tracer):
         again = simulator.frame(want=["iq"])
     with insonify.Simulator(ball(bent, triangles, simulation=still), tracer=tracer) as simulator:
         wanted = simulator.frame(want=["iq"])
-    # The device makes normals anew: they differ in the last digits.
     peak = np.abs(rest.iq).max()
     assert np.abs(rest.iq - shown.iq).max() > 0.1 * peak
     assert np.abs(shown.iq - wanted.iq).max() < 1e-3 * peak
-    assert np.abs(back.iq - rest.iq).max() < 1e-3 * peak
+    # A line in the middle of the ball meets edges exactly: which of both triangles it finds is the tree's to say.
+    assert np.abs(back.iq - rest.iq).max() < 2e-4 * peak
     assert (again.iq == shown.iq).all()
+
+
+def test_a_live_mesh_comes_back_as_it_was():
+    """Tissue inside, with speckle that moves with it, and labels."""
+    vertices, triangles = sphere(radius=8, centre=(0, 0, 20))
+    scene = ball(vertices, triangles, simulation={"paths": 2, "labels": True})
+    scene["mesh.ball.tissue"] = "liver"
+    with insonify.Simulator(scene, tracer="bvh") as simulator:
+        rest = simulator.frame(want=["iq", "labels"])
+        scene.set_vertices("ball", vertices * [1.1, 1, 1])
+        away = simulator.frame(want=["iq"])
+        scene.set_vertices("ball", vertices)
+        back = simulator.frame(want=["iq"])
+        still = simulator.frame(want=["iq", "labels"])
+    assert (away.iq != rest.iq).any()
+    assert (back.iq == rest.iq).all() and (still.iq == rest.iq).all()
+    for name in rest.labels:
+        np.testing.assert_array_equal(rest.labels[name], still.labels[name])
 
 
 def test_tissue_moves_with_a_live_mesh():

@@ -135,6 +135,8 @@ impl Fields {
         self.slots[i].map_or(NONE, |slots| match keyframes.strategy {
             _ if self.rests[i].is_some() => slots.blended,
             Strategy::Interpolate => slots.blended,
+            // Back at rest tissue is what it was before a program had moved it.
+            _ if keyframes.revision > 0 && keyframes.nearest() == 0 => NONE,
             _ => slots.first + keyframes.nearest() as u32 * slots.stride,
         })
     }

@@ -8,7 +8,8 @@ use super::mesh::Mesh;
 
 impl Scene {
     /// Gives an instance another shape of its present topology. The first time it gets two keyframes, its shape at rest
-    /// and this one: tissue then moves with the surface. The world takes the shape at its next update.
+    /// and this one: tissue then moves with the surface. Back in its shape at rest it shows the first of them, and is as
+    /// if it had never left it. The world takes the shape at its next update.
     ///
     /// # Panics
     /// Another topology; an instance with keyframes of its own.
@@ -21,20 +22,20 @@ impl Scene {
         };
         assert!(shape.shares_topology(&self.meshes[rest]), "`{}` has other triangles", shape.name);
         // A field that moves tissue is made for what differs from the shape at rest.
-        if live == self.meshes.len() {
-            if shape.positions == self.meshes[rest].positions {
-                return;
-            }
-            self.meshes.push(shape);
-        } else {
-            self.meshes[live] = shape;
+        let rests = shape.positions == self.meshes[rest].positions;
+        match live == self.meshes.len() {
+            true if rests => return,
+            true => self.meshes.push(shape),
+            false if rests => {}
+            false => self.meshes[live] = shape,
         }
         let instance = &mut self.instances[instance];
-        instance.mesh = live;
+        let shown = usize::from(!rests);
+        instance.mesh = [rest, live][shown];
         instance.keyframes = Keyframes {
             meshes: vec![rest, live],
             strategy: Strategy::Refit,
-            blend: [(1, 1.0), (0, 0.0), (0, 0.0), (0, 0.0)],
+            blend: [(shown, 1.0), (0, 0.0), (0, 0.0), (0, 0.0)],
             group: None,
             revision: instance.keyframes.revision + 1,
         };

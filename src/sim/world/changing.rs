@@ -113,7 +113,11 @@ impl ChangingInstances {
             region.version += 1;
             let strategy = instance.keyframes.strategy;
             let fresh = match strategy.needs_shared_topology() {
-                true => self.refit.shape(commands, scene, i, geometry, region, top)?,
+                true => {
+                    // Shapes that a program has set are still being written.
+                    commands.barrier(Stage::Transfer, Stage::Transfer);
+                    self.refit.shape(commands, scene, i, places, geometry, region, top)?
+                }
                 false => {
                     let place = &places[instance.mesh];
                     let averages = &self.averages[instance.mesh];

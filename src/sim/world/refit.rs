@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::arrays::{GeometryRange, ordered};
+use super::arrays::{Averages, GeometryRange, ordered};
 use super::changing::{put_tree, put_triangles};
 use super::top::TopLevel;
 use super::{GeometryBuffers, ShapeKernels, WorldError};
@@ -13,7 +13,7 @@ use crate::gpu::{Binding, Buffer, BufferKind, Commands, Device, GpuError, Stage}
 use crate::layout::{PACKED, SUM, UNIT};
 use crate::push;
 use crate::scene::smoothed::LEVELS;
-use crate::scene::{Instance, Scene, Strategy};
+use crate::scene::{Instance, Mesh, Scene, Strategy};
 use crate::tracer::Tracer;
 
 /// Relative cost of rays from which on a tree is built again instead of refitted (choice; a build costs some
@@ -86,17 +86,23 @@ impl Refit {
     }
 
     /// Records the triangles and the tree of the base that serves instance `index` now, unless the
-    /// region has them already. Returns true if it had not: a structure must then be built, not refitted.
+    /// region has them already, and the vertices of a keyframe that is shown as it is. Returns true if the region had no such
+    /// triangles: a structure must then be built, not refitted.
+    #[allow(clippy::too_many_arguments, reason = "the parts of one world")]
     pub(super) fn shape(
         &mut self,
         commands: &mut Commands<'_>,
         scene: &Scene,
         index: usize,
+        places: &[GeometryRange],
         geometry: &GeometryBuffers,
         region: &mut GeometryRange,
         top: &mut TopLevel,
     ) -> Result<bool, WorldError> {
         let instance = &scene.instances[index];
+        if instance.keyframes.strategy == Strategy::Refit {
+            copy(commands, &scene.meshes, instance.mesh, places, geometry, region)?;
+        }
         let body = self.bodies[index].as_mut().expect("made for this strategy");
         let serving = body.serving[keyframe(instance)];
         if body.held == Some(serving) {
@@ -135,12 +141,13 @@ impl Refit {
                 continue;
             };
             let instance = &scene.instances[index];
+            let between = instance.keyframes.strategy == Strategy::Interpolate;
             let made = [
                 (&geometry.vertices, SUM, 1),
                 (&geometry.normals, UNIT, 1),
                 (&geometry.smoothed, PACKED, LEVELS as u32),
             ];
-            for (values, kind, each) in made {
+            for (values, kind, each) in made.into_iter().filter(|_| between) {
                 let push = interpolation(scene, instance, places, region, kind, each);
                 commands.dispatch(
                     &self.kernels.interpolate,
@@ -212,19 +219,37 @@ fn interpolation(
 ) -> push::Interpolate {
     let keyframes = &instance.keyframes;
     let source = |k: usize| each * places[keyframes.meshes[k]].first_vertex;
-    let mut push = push::Interpolate {
+    push::Interpolate {
         count: each * scene.meshes[keyframes.meshes[0]].positions.len() as u32,
         target: each * region.first_vertex,
         kind,
-        sources: [source(keyframe(instance)); 4],
-        weights: [1.0, 0.0, 0.0, 0.0],
+        sources: keyframes.blend.map(|(k, _)| source(k)),
+        weights: keyframes.blend.map(|(_, weight)| weight as f32),
         stride: if kind == PACKED { 1 } else { 3 },
-    };
-    if keyframes.strategy == Strategy::Interpolate {
-        push.sources = keyframes.blend.map(|(k, _)| source(k));
-        push.weights = keyframes.blend.map(|(_, weight)| weight as f32);
     }
-    push
+}
+
+/// Records the copy of a mesh's vertices into a region: to the bit what is shown where nothing is refitted.
+fn copy(
+    commands: &mut Commands<'_>,
+    meshes: &[Arc<Mesh>],
+    mesh: usize,
+    places: &[GeometryRange],
+    geometry: &GeometryBuffers,
+    region: &GeometryRange,
+) -> Result<(), GpuError> {
+    let count = meshes[mesh].positions.len() as u64;
+    let copied = [
+        (&geometry.vertices, size_of::<[f32; 3]>()),
+        (&geometry.normals, size_of::<[f32; 3]>()),
+        (&geometry.smoothed, size_of::<Averages>()),
+    ];
+    for (buffer, each) in copied {
+        let at = |vertex: u32| each as u64 * u64::from(vertex);
+        let from = at(places[mesh].first_vertex);
+        commands.copy((buffer, from), (buffer, at(region.first_vertex)), each as u64 * count)?;
+    }
+    Ok(())
 }
 
 fn body(
