@@ -81,6 +81,29 @@ impl Image {
         extent: [u32; 3],
         format: ImageFormat,
     ) -> Result<Self, GpuError> {
+        Self::with_usage(device, name, dim, extent, format, vk::ImageUsageFlags::empty())
+    }
+
+    /// Makes an image of four bytes a texel on which an interface can be drawn.
+    #[cfg(feature = "window")]
+    pub(crate) fn drawn_on(
+        device: &Arc<Device>,
+        name: &str,
+        [width, height]: [u32; 2],
+    ) -> Result<Self, GpuError> {
+        let usage = vk::ImageUsageFlags::COLOR_ATTACHMENT;
+        let extent = [width, height, 1];
+        Self::with_usage(device, name, ImageDim::D2, extent, ImageFormat::Rgba8Unorm, usage)
+    }
+
+    fn with_usage(
+        device: &Arc<Device>,
+        name: &str,
+        dim: ImageDim,
+        extent: [u32; 3],
+        format: ImageFormat,
+        also: vk::ImageUsageFlags,
+    ) -> Result<Self, GpuError> {
         check_extent(device, name, dim, extent)?;
         // SAFETY: the physical device belongs to the instance.
         let properties = unsafe {
@@ -97,7 +120,7 @@ impl Image {
             });
         }
         let storage = features.contains(Feature::STORAGE_IMAGE);
-        let mut usage = Usage::SAMPLED | Usage::TRANSFER_SRC | Usage::TRANSFER_DST;
+        let mut usage = also | Usage::SAMPLED | Usage::TRANSFER_SRC | Usage::TRANSFER_DST;
         if storage {
             usage |= Usage::STORAGE;
         }

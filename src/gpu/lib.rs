@@ -21,6 +21,8 @@ mod ahead;
 mod barrier;
 mod blas;
 mod build_times;
+#[cfg(feature = "window")]
+mod canvas;
 mod commands;
 mod descriptors;
 mod device;
@@ -55,6 +57,8 @@ pub use ahead::{compile_standard_input, set_compiler, try_kernel};
 pub use barrier::Stage;
 pub use blas::{Blas, BlasInput, BlasOptions};
 pub use build_times::{BuildTimes, RefitTimes, build_times, refit_times};
+#[cfg(feature = "window")]
+pub use canvas::{InterfaceFrame, PlacedImage, Screenshot, picture};
 pub use commands::{Binding, Commands};
 pub use device::{
     Device, DeviceOptions, Limits, LoneDevice, TestDevice, lone_device, lone_test_device,
@@ -69,7 +73,7 @@ pub use kept::cache_folder;
 pub use kernel::Kernel;
 pub use memory::{Buffer, BufferKind, MemoryUse};
 #[cfg(feature = "window")]
-pub use painter::{InterfaceFrame, Painted, Painter, PlacedImage, Screenshot};
+pub use painter::{Painted, Painter};
 pub use process::{
     driver_environment, end_without_drivers, peak_bytes, prepare_process, unreadable_pad,
 };

@@ -277,7 +277,8 @@ pub(super) fn table(ui: &Ui, sheet: &mut Sheet, exam: Exam, frame: &Frame, bare:
     if !sheet.marks().iter().any(|mark| is_measured(&mark.what)) {
         return;
     }
-    let corner = ui.max_rect().left_top() + vec2(46.0, 64.0);
+    // In a saved picture it has a column of its own.
+    let corner = ui.max_rect().left_top() + if bare { vec2(8.0, 12.0) } else { vec2(46.0, 64.0) };
     let mut removed = None;
     Area::new(Id::new("results")).fixed_pos(corner).constrain_to(ui.max_rect()).show(
         ui.ctx(),

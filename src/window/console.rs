@@ -96,8 +96,6 @@ impl Console {
             probe::show(ui, &mut desk.model.settings, &mut desk.common.open);
         });
         section(ui, "Image", true, |ui| image::show(ui, &mut desk.model.settings));
-        let settings = &mut desk.model.settings.imaged;
-        settings::Settings::each(&mut Others { ui, settings });
         section(ui, "Poses", false, |ui| match desk.model.examined {
             true => drop(ui.label(EXAMINED)),
             false => poses::show(ui, desk.model, &mut self.poses, now),
@@ -108,6 +106,7 @@ impl Console {
         section(ui, "Simulation", false, |ui| {
             simulation::show(ui, settings, &desk.common.device, lattice);
         });
+        settings::Settings::each(&mut Others { ui, settings: &mut settings.imaged });
         if settings.fusion.is_some() {
             section(ui, "Fusion", false, |ui| fusion::show(ui, desk.model, now));
         }

@@ -163,16 +163,19 @@ fn beside_image(
     seen: Seen<'_>,
     alone: bool,
 ) -> Option<(Rect, f32)> {
-    let (mut last, mut left) = (None, None);
+    let (mut last, mut left) = (None, None::<f32>);
     each(model, state, seen, |panel, desk| match open(panel, desk) {
         Some(Dock::Beside) => last = Some(panel.row().name),
         Some(Dock::Left(width)) => left = Some(width),
         _ => {}
     });
-    let room = ui.available_rect_before_wrap();
+    let mut room = ui.available_rect_before_wrap();
+    if let Some(left) = left.filter(|left| room.width() - left >= LEAST_IMAGE) {
+        room.min.x += left;
+    }
     let width = view3d::width(room.width(), state.share).filter(|_| last.is_some());
     // The column takes the shared room where there is too little for both.
-    let fits = |width: &f32| left.is_none_or(|left| room.width() - width >= left + LEAST_IMAGE);
+    let fits = |width: &f32| left.is_none() || room.width() - width >= LEAST_IMAGE;
     let width = width.filter(fits).filter(|_| !alone);
     if let Some(width) = width {
         // Transparent: the pictures are below the interface.
@@ -248,10 +251,8 @@ fn images(
     seen: Seen<'_>,
 ) -> (Option<Place>, Option<Place>) {
     let Seen { frame, now, .. } = seen;
-    // A picture to be saved has its marks and nothing that is pressed.
-    let bare = state.common.tools.wants_shot(model, state.dual.is_on());
     let [room, beside] = state.dual.rooms(ui.max_rect());
-    let held = state.dual.show(ui, (beside, bare), model, &state.framing);
+    let held = state.dual.show(ui, (beside, false), model, &state.framing);
     let place = match frame {
         Some(frame) => bmode::show(ui, room, (frame, false), model, &state.framing),
         None => {
@@ -259,11 +260,10 @@ fn images(
             None
         }
     };
-    state.common.tools.cleared = bare;
     let (sheet, listens) = (&mut model.sheet, !state.has_dialog());
     let kind = model.settings.imaging.exam;
     if let (Some(place), Some(frame)) = (&place, frame) {
-        calipers::show(ui, sheet, place, frame, (kind, listens, bare));
+        calipers::show(ui, sheet, place, frame, (kind, listens, false));
         let newest = state.common.tools.cine.newest().map(|newest| newest.seconds);
         ecg::show(ui, place, (frame, newest), model.beat.filter(|_| kind == Exam::Cardiac));
         state.framing.follow(ui, place);
@@ -272,29 +272,24 @@ fn images(
             let point = frame.pose.transform_point3(DVec3::new(mm.x, 0.0, mm.y));
             state.naming.asked = Some((at, naming::Question::Place(point)));
         }
-        calipers::table(ui, sheet, kind, frame, bare);
-        if !bare {
-            let dual = state.dual.is_on();
-            let mark = (&mut model.body, kind, dual);
-            if strip::show(ui, &mut state.common.tools, sheet, mark) {
-                dual::hold(model, &mut state.dual, &state.common.tools, now);
-            }
+        calipers::table(ui, sheet, kind, frame, false);
+        let mark = (&mut model.body, kind, state.dual.is_on());
+        if strip::show(ui, &mut state.common.tools, sheet, mark) {
+            dual::hold(model, &mut state.dual, &state.common.tools, now);
         }
         if let Some(mark) = &mut model.body {
-            body::show(ui, mark, bare);
+            body::show(ui, mark, false);
         }
     }
     if let (Some(place), Some(frame), Some(strip)) = (&place, frame, &mut model.mmode) {
         mmode::aim(ui, place, frame, strip, model.frozen);
     }
-    if let Some(place) = place.as_ref().filter(|_| !bare) {
+    if let Some(place) = &place {
         beside::show(ui, place, model, now);
     }
-    if !bare {
-        notice::show(ui, &mut state.common.inputs);
-        notice::recording(ui, model, now);
-        saved::show(ui, &mut state.common.tools);
-        notice::stale(ui, state.stale.as_deref());
-    }
+    notice::show(ui, &mut state.common.inputs);
+    notice::recording(ui, model, now);
+    saved::show(ui, &mut state.common.tools);
+    notice::stale(ui, state.stale.as_deref());
     (place, held)
 }

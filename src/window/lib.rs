@@ -38,6 +38,7 @@ mod leaving;
 mod lesson;
 mod link;
 pub mod look;
+mod marked;
 mod mmode;
 pub mod model;
 mod naming;

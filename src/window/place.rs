@@ -1,6 +1,6 @@
 //! Where the B-mode image lies on the screen.
 
-use egui::{Pos2, Rect, pos2, vec2};
+use egui::{Pos2, Rect, Vec2, pos2, vec2};
 use glam::{DVec2, dvec2};
 
 use super::framing::Framing;
@@ -109,6 +109,17 @@ impl Place {
     /// Length of a point of the screen, mm.
     pub(super) fn mm_per_point(&self) -> f64 {
         1.0 / self.scale[1]
+    }
+}
+
+/// The smallest area whose image, with its texts around it, is as large as `image`, points.
+pub(super) fn around(image: Vec2) -> Vec2 {
+    let [left, top, right, bottom] = MARGINS;
+    let area = image + vec2(left + right, top + bottom);
+    // In a narrow area texts have no room; one with the curve is wider.
+    match area.x + CURVE >= NARROW {
+        true => area + vec2(CURVE, 0.0),
+        false => vec2(NARROW.max(area.x + CURVE), area.y),
     }
 }
 

@@ -55,8 +55,6 @@ pub(super) struct Tools {
     stills: Vec<PathBuf>,
     /// Capture to be saved once the window has been drawn.
     due: Option<Wanted>,
-    /// True where the window has been drawn without what is pressed, for a picture of it.
-    pub(super) cleared: bool,
     last: Wanted,
     was_frozen: bool,
 }
@@ -80,7 +78,6 @@ impl Tools {
             device: format!("{} ({})", device.name, device.driver),
             stills: Vec::new(),
             due: None,
-            cleared: false,
             last: Wanted::Still,
             was_frozen: false,
         }
@@ -163,8 +160,8 @@ impl Tools {
         self.due = Some(self.last);
     }
 
-    /// Returns whether a picture of the window is wanted.
-    pub(super) fn wants_shot(&self, model: &Model, is_dual: bool) -> bool {
+    /// Returns whether a picture of the image with its marks is wanted.
+    pub(super) fn wants_marked(&self, model: &Model, is_dual: bool) -> bool {
         let marked = !model.sheet.marks().is_empty() || model.body.is_some() || is_dual;
         self.due == Some(Wanted::Still) && marked
     }
@@ -183,7 +180,7 @@ impl Tools {
         self.due.is_some() || self.captures.running().next().is_some()
     }
 
-    /// Saves the wanted content. `marked` is the picture of the window around the image, `strip` that of M-mode,
+    /// Saves the wanted content. `marked` is the picture of the image with its marks, `strip` that of M-mode,
     /// `study` what DICOM files belong to.
     pub(super) fn save(
         &mut self,
@@ -347,33 +344,4 @@ fn settings(model: &Model, frame: &Frame, pose: Option<&DAffine3>) -> Sidecar {
     let said =
         [("set", set.into()), ("settings", all), ("tracer", settings.tracer.to_string().into())];
     said.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()
-}
-
-/// The part of a picture of the window inside `area`, pixels: left, top, right, bottom.
-pub(super) fn cropped(shot: &Screenshot, area: [f32; 4]) -> Screenshot {
-    let limit = |at: f32, size: u32| at.round().clamp(0.0, size as f32) as usize;
-    let [width, height] = shot.size;
-    let (left, right) = (limit(area[0], width), limit(area[2], width));
-    let (top, bottom) = (limit(area[1], height), limit(area[3], height));
-    let row =
-        |y: usize| &shot.rgba[4 * (y * width as usize + left)..4 * (y * width as usize + right)];
-    Screenshot {
-        size: [(right - left) as u32, (bottom - top) as u32],
-        rgba: (top..bottom).flat_map(row).copied().collect(),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::{Screenshot, cropped};
-
-    #[test]
-    fn a_part_of_a_picture_is_that_part() {
-        let shot =
-            Screenshot { size: [4, 3], rgba: (0..12).flat_map(|i| [i, 0, 0, 255]).collect() };
-        let part = cropped(&shot, [1.2, 0.6, 9.0, 3.0]);
-        assert_eq!(part.size, [3, 2]);
-        let red: Vec<u8> = part.rgba.chunks(4).map(|p| p[0]).collect();
-        assert_eq!(red, [5, 6, 7, 9, 10, 11]);
-    }
 }

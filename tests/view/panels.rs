@@ -21,6 +21,9 @@ samples = 512
 image_height = 400
 noise = -inf
 
+[processing]
+speckle_reduction = 0.2
+
 [volume]
 file = "volume.mha"
 
@@ -148,6 +151,7 @@ fn each_section_sets_what_is_saved_and_undo_takes_it_back() {
         "Animation",
         "Probe input",
         "Simulation",
+        "Processing",
         "Fusion",
         "Registration",
         "Tissues",
@@ -158,6 +162,7 @@ fn each_section_sets_what_is_saved_and_undo_takes_it_back() {
         ("Probe", 0, "depth"),
         ("Image", 0, "gain"),
         ("Simulation", 0, "paths"),
+        ("Processing", 0, "speckle_reduction"),
         ("Fusion", 0, "blur"),
         ("Tissues", 0, "speed"),
         ("Surfaces", 0, "thickness"),

@@ -5,12 +5,12 @@ use std::time::{Duration, Instant};
 use super::{Open, gestures};
 use crate::gpu::{GpuError, InterfaceFrame, Painted, PlacedImage, Screenshot};
 use crate::layout::{self, Places};
+use crate::marked::marked;
 use crate::panel::Seen;
 use crate::picture::Frame;
 use crate::place::Place;
 use crate::statistics::{Sample, Times};
 use crate::timing::costs;
-use crate::tools::cropped;
 use crate::{acts, mmode, real};
 
 /// Number of images of an animation after which a screenshot is taken.
@@ -85,29 +85,9 @@ impl Open {
             textures: std::mem::take(&mut output.textures_delta),
         };
         let size = [size.width, size.height];
-        let painter = &mut self.session.painter;
-        let tools = &mut self.state.common.tools;
-        let wanted =
-            tools.wants_shot(&self.model, self.state.dual.is_on()) && painter.can_be_read();
-        let marked = wanted && tools.cleared;
-        let painted = painter.paint(size, &placed, interface, shot || marked)?;
+        let painted = self.session.painter.paint(size, &placed, interface, shot)?;
         self.session.engine.drawn();
-        let picture = match &painted {
-            Painted::Shown(picture) => picture.as_ref().filter(|_| marked),
-            Painted::Skipped => None,
-        };
-        let around = picture.zip(places.image.as_ref()).map(|(picture, place)| {
-            let both = places.held.as_ref().map_or(place.area, |held| place.area.union(held.area));
-            let r = both * scale;
-            cropped(picture, [r.left(), r.top(), r.right(), r.bottom()])
-        });
-        let strip = || mmode::saved(&self.model, &self.state.panels.mmode);
-        let study = || self.state.panels.exam.study(self.model.settings.imaging.exam);
-        // Asked for while it was drawn: the next drawing is the one without buttons.
-        match wanted && !marked {
-            true => context.request_repaint(),
-            false => tools.save(&self.model, around, strip, study),
-        }
+        self.save(shown.as_ref())?;
         self.painted = (began, began.elapsed());
         self.schedule(&output);
         match painted {
@@ -117,6 +97,27 @@ impl Open {
             }
             Painted::Skipped => Ok(None),
         }
+    }
+
+    /// Saves what was asked for.
+    fn save(&mut self, shown: Option<&Frame>) -> Result<(), GpuError> {
+        let (model, state) = (&mut self.model, &mut self.state);
+        let wanted = state.common.tools.wants_marked(model, state.dual.is_on());
+        let drawn = shown.filter(|_| wanted);
+        let drawn = drawn.map(|frame| marked(&self.session.device, model, state, frame));
+        let marked = match drawn.transpose() {
+            Ok(marked) => marked,
+            Err(error @ GpuError::DeviceLost { .. }) => return Err(error),
+            // The image itself is saved all the same.
+            Err(error) => {
+                state.common.tools.notices.failed(error.to_string());
+                None
+            }
+        };
+        let strip = || mmode::saved(model, &state.panels.mmode);
+        let study = || state.panels.exam.study(model.settings.imaging.exam);
+        state.common.tools.save(model, marked, strip, study);
+        Ok(())
     }
 
     /// Sends the view of the anatomy to the simulation.
