@@ -59,6 +59,8 @@ fn render_writes_picture_stages_and_figures_without_a_validation_message() {
                 "3",
                 "--set",
                 "simulation.labels=true",
+                "--set",
+                "processing.speckle_reduction=0.5",
                 "--validate",
             ],
         );

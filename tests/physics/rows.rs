@@ -80,8 +80,8 @@ rows! {
     penumbra::the_edge_of_a_shadow_is_as_wide_as_the_aperture_makes_it,
     reverberation::the_echoes_of_a_plate_are_on_every_line,
     vessel::speckle_behind_a_round_vessel_is_as_bright_as_waves_make_it,
-    chain::enhanced_speckle_has_the_deviation_of_its_correlation,
     strips::speckle_is_as_bright_however_refraction_parts_the_paths ("long: ./tools/test.sh --long"),
+    chain::enhanced_speckle_has_the_deviation_of_its_correlation,
 }
 
 #[test]
