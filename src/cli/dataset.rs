@@ -1,23 +1,27 @@
 //! `insonify dataset`: labelled samples by a plan, shard by shard.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Instant;
 
 use clap::Args;
 use miette::{IntoDiagnostic, Result, miette};
 
 use super::common::{self, Progress, TracerChoice};
-use insonify::dataset::{DatasetError, Event, Made, Part, Plan, Run, Store};
+use insonify::dataset::layouts::{self, Layout, Licence};
+use insonify::dataset::{DatasetError, Event, Format, Made, Part, Plan, Run, Store, Studio};
 use insonify::gpu::{Device, DeviceOptions, cache_folder, peak_bytes};
 use insonify::output;
+use insonify::settings::suggest;
 use insonify::sim::Tracer;
 
 /// Arguments of `insonify dataset`.
 #[derive(Debug, Args)]
 pub struct Dataset {
-    /// The plan (.toml): scenes, poses, ranges of settings, counts, splits and formats.
+    /// The plan (.toml): scenes, poses, ranges of settings, counts, splits and formats; with --layout the folder of a
+    /// finished data set
     plan: PathBuf,
-    /// Folder of the data set. Shards may share it.
+    /// Folder of the data set; shards may share it. With --layout the new folder, or the table (.csv)
     #[arg(short, long)]
     output: PathBuf,
     /// Makes only shard I of N, counted from 0: the same bytes as in the whole.
@@ -26,9 +30,15 @@ pub struct Dataset {
     /// Goes on with what a run that was stopped left of this shard; the result is the same.
     #[arg(long)]
     resume: bool,
-    /// Checks the plan and says what it makes, and makes nothing.
+    /// Checks the plan, says what it makes, and makes a sample of each scene for a trial: time, files and bytes of all.
     #[arg(long)]
     check: bool,
+    /// Writes a finished data set once more in the layout of nnU-Net, COCO or Hugging Face, or as a table of its samples.
+    #[arg(long, value_name = "LAYOUT", value_parser = layout, conflicts_with_all = ["check", "resume", "shard"])]
+    layout: Option<Layout>,
+    /// The licence that the card of a layout states, such as cc-by-4.0.
+    #[arg(long, requires = "layout")]
+    licence: Option<String>,
     /// Tracer.
     #[arg(long, value_enum, default_value = "auto")]
     tracer: TracerChoice,
@@ -51,11 +61,34 @@ fn shard(text: &str) -> Result<[u32; 2], String> {
     }
 }
 
+fn layout(text: &str) -> Result<Layout, String> {
+    let found = Layout::ALL.into_iter().find(|layout| layout.word() == text);
+    found.ok_or_else(|| suggest::among(text, Layout::ALL.map(Layout::word).into_iter()))
+}
+
+/// Writes a finished data set in a layout.
+fn laid_out(args: &Dataset, layout: Layout) -> Result<()> {
+    let licence = Licence::new(args.licence.clone());
+    let mut progress: Option<Progress> = None;
+    layouts::write(&args.plan, layout, &licence, &args.output, &mut |done, of| {
+        let shown = progress.get_or_insert_with(|| Progress::new(of as u32, "samples"));
+        shown.done(done as u32);
+    })?;
+    if let Some(progress) = progress {
+        progress.finish();
+    }
+    output::line(args.output.display());
+    Ok(())
+}
+
 /// Runs the command.
 ///
 /// # Errors
 /// Every mistake of the user and every error of the device, reported once.
 pub fn run(args: &Dataset) -> Result<()> {
+    if let Some(layout) = args.layout {
+        return laid_out(args, layout);
+    }
     let (plan, warnings) = Plan::load(&args.plan)?;
     common::notes(&warnings);
     let run = Run { plan: &plan, root: &args.output, shard: args.shard, resume: args.resume };
@@ -68,7 +101,16 @@ pub fn run(args: &Dataset) -> Result<()> {
                 "the draws of {checked} of them were checked, evenly among them; the rest when they are made"
             ));
         }
-        return Ok(());
+        if parts.is_empty() {
+            return Ok(());
+        }
+        return match device(args) {
+            Ok((device, tracer)) => tried(&plan, &args.output, &parts, &device, tracer),
+            Err(error) => {
+                output::note(format!("how long it takes is not known: {error}"));
+                Ok(())
+            }
+        };
     }
     if parts.is_empty() {
         let ([index, count], all) = (args.shard, plan.parts().len());
@@ -77,26 +119,7 @@ pub fn run(args: &Dataset) -> Result<()> {
         ));
         return Ok(());
     }
-    let device = Device::new(&DeviceOptions {
-        without_acceleration_structures: args.tracer == TracerChoice::Bvh,
-        selector: args.device.clone(),
-        validate: args.validate,
-        kept_in: cache_folder(),
-        ..DeviceOptions::default()
-    })
-    .into_diagnostic()?;
-    let wanted = match args.tracer {
-        TracerChoice::Auto => None,
-        TracerChoice::RayQuery if !device.supports_ray_query() => {
-            return Err(miette!(
-                help = "use --tracer bvh, which runs everywhere, or another --device",
-                "{} has no ray query",
-                device.name()
-            ));
-        }
-        TracerChoice::RayQuery => Some(Tracer::RayQuery),
-        TracerChoice::Bvh => Some(Tracer::Bvh),
-    };
+    let (device, wanted) = device(args)?;
     let mut log = Log::new(samples);
     let sheet = run.make(&device, wanted, &mut |store, event| log.take(store, event))?;
     let rate = log.rate();
@@ -128,6 +151,82 @@ pub fn run(args: &Dataset) -> Result<()> {
             Err(miette!("{} validation messages, the first: {first}", messages.len()))
         }
         _ => Ok(()),
+    }
+}
+
+/// The device that was asked for, and its tracer where that was.
+fn device(args: &Dataset) -> Result<(Arc<Device>, Option<Tracer>)> {
+    let device = Device::new(&DeviceOptions {
+        without_acceleration_structures: args.tracer == TracerChoice::Bvh,
+        selector: args.device.clone(),
+        validate: args.validate,
+        kept_in: cache_folder(),
+        ..DeviceOptions::default()
+    })
+    .into_diagnostic()?;
+    let wanted = match args.tracer {
+        TracerChoice::Auto => None,
+        TracerChoice::RayQuery if !device.supports_ray_query() => {
+            return Err(miette!(
+                help = "use --tracer bvh, which runs everywhere, or another --device",
+                "{} has no ray query",
+                device.name()
+            ));
+        }
+        TracerChoice::RayQuery => Some(Tracer::RayQuery),
+        TracerChoice::Bvh => Some(Tracer::Bvh),
+    };
+    Ok((device, wanted))
+}
+
+/// Makes a sample of each scene twice, of which the second says what the others take, and prints that for the shard.
+fn tried(
+    plan: &Plan,
+    root: &Path,
+    parts: &[Part],
+    device: &Arc<Device>,
+    tracer: Option<Tracer>,
+) -> Result<()> {
+    let store = Store::new(plan, root);
+    let mut studio = Studio::new(plan, device, tracer);
+    let (mut seconds, mut files, mut bytes) = (0.0, 0, 0);
+    for ([first, second], count) in plan.scenes_of(parts) {
+        // The first one includes what is made once.
+        studio.make(first)?;
+        let began = Instant::now();
+        let made = studio.make(second)?;
+        seconds += began.elapsed().as_secs_f64() * f64::from(count);
+        let [own, weight] = store.weight(&made);
+        files += own * u64::from(count);
+        bytes += weight * u64::from(count);
+    }
+    let archives = if plan.formats.contains(&Format::WebDataset) { parts.len() } else { 0 };
+    output::line(format!(
+        "about {}, {} in {} files, by a trial on {}",
+        time(seconds),
+        size(bytes),
+        files + archives as u64,
+        device.name()
+    ));
+    Ok(())
+}
+
+/// A time in words.
+fn time(seconds: f64) -> String {
+    match seconds {
+        s if s < 90.0 => format!("{s:.0} s"),
+        s if s < 5400.0 => format!("{:.0} min", s / 60.0),
+        s if s < 172_800.0 => format!("{:.1} hours", s / 3600.0),
+        s => format!("{:.1} days", s / 86_400.0),
+    }
+}
+
+/// Bytes in words.
+fn size(bytes: u64) -> String {
+    match bytes as f64 {
+        b if b < 1e9 => format!("{:.1} MB", b / 1e6),
+        b if b < 1e12 => format!("{:.1} GB", b / 1e9),
+        b => format!("{:.2} TB", b / 1e12),
     }
 }
 

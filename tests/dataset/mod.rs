@@ -7,6 +7,7 @@ use std::sync::OnceLock;
 
 use crate::common::program;
 
+mod layouts;
 mod made;
 mod plans;
 mod readers;

@@ -294,6 +294,19 @@ impl Plan {
         self.parts().into_iter().skip(index as usize).step_by(count as usize).collect()
     }
 
+    /// For each scene that has samples among `parts`: the numbers of two of them, which may be one, and how many there are.
+    pub fn scenes_of(&self, parts: &[Part]) -> Vec<([u32; 2], u32)> {
+        let of = |scene: &PlanScene| {
+            let all = parts.iter().flat_map(|part| part.samples.clone());
+            let mut own = all.filter(|number| scene.samples.contains(number));
+            let first = own.next()?;
+            let second = own.next();
+            let count = 1 + u32::from(second.is_some()) + own.count() as u32;
+            Some(([first, second.unwrap_or(first)], count))
+        };
+        self.scenes.iter().filter_map(of).collect()
+    }
+
     /// The draws of a sample: a function of the plan's text and the number alone.
     ///
     /// # Panics

@@ -17,7 +17,7 @@ use super::studio::{Made, Studio};
 use crate::issue::FileError;
 use crate::output::{self, files};
 
-const MANIFEST: &str = "manifest.json";
+pub(super) const MANIFEST: &str = "manifest.json";
 const PLAN: &str = "plan.toml";
 /// Digits of the numbers in names of files, at least.
 const DIGITS: usize = 6;
@@ -287,6 +287,18 @@ impl<'p> Store<'p> {
         Ok(())
     }
 
+    /// Number and bytes of the files that such a sample has, in all formats; of archives its part.
+    pub fn weight(&self, made: &Made) -> [u64; 2] {
+        let files = members(self.plan, made);
+        let own = self.own.iter().map(|own| self.bytes(own, made, &files).len() as u64);
+        let archived = match self.writes(Format::WebDataset) {
+            // Each member has a head, and is filled up to whole blocks.
+            true => files.iter().map(|bytes| 512 + bytes.len().next_multiple_of(512) as u64).sum(),
+            false => 0,
+        };
+        [self.own.len() as u64, own.sum::<u64>() + archived]
+    }
+
     /// Names of a sample's files in archives.
     fn names(&self, number: u32) -> Vec<String> {
         let name = self.name(number);
@@ -384,7 +396,7 @@ impl<'p> Store<'p> {
 }
 
 /// The grey levels of a PNG file's pixels.
-fn picture(bytes: &[u8]) -> Result<GrayImage, png::DecodingError> {
+pub(super) fn picture(bytes: &[u8]) -> Result<GrayImage, png::DecodingError> {
     let mut decoder = png::Decoder::new(std::io::Cursor::new(bytes));
     decoder.set_transformations(png::Transformations::IDENTITY);
     let mut reader = decoder.read_info()?;
