@@ -6,7 +6,7 @@ use std::time::Instant;
 use super::files::message_of;
 use super::model::Model;
 use crate::igtl::{Order, Reach};
-use crate::scene::file::{facts, put_settings, value_of_settings};
+use crate::scene::file::{facts, keys_below, put_settings, value_of_settings};
 
 /// Carries out the order of a client; returns the answer. A scene to be opened becomes `wanted`.
 ///
@@ -26,14 +26,16 @@ pub(super) fn carry_out(
             let told = pairs.iter().map(|(path, value)| format!("{path} = {value}"));
             Ok(told.collect::<Vec<_>>().join("\n"))
         }
-        Order::Get(path) => {
-            let facts = facts(path)?;
-            let value = value_of_settings(&model.settings, path).ok_or_else(|| {
-                format!("`{path}` is not told by a window; `insonify serve` tells it")
-            })?;
-            let text = facts.text(&value).ok_or_else(|| format!("`{path}` is not set"))?;
-            Ok(format!("{path} = {text}"))
-        }
+        Order::Get(path) => match &keys_below(path)[..] {
+            [] => get(model, path),
+            keys => {
+                let set: Vec<String> = keys.iter().filter_map(|key| get(model, key).ok()).collect();
+                match set.is_empty() {
+                    true => Err(format!("`{path}` {NOT_TOLD}")),
+                    false => Ok(set.join("\n")),
+                }
+            }
+        },
         Order::Time(seconds) => {
             model.clock.seek(*seconds, now);
             model.touch(now);
@@ -50,6 +52,18 @@ pub(super) fn carry_out(
             Ok(told)
         }
     }
+}
+
+/// Why the value of a key is not in the answer.
+const NOT_TOLD: &str = "is not told by a window; `insonify serve` tells it";
+
+/// The value of a key.
+fn get(model: &Model, path: &str) -> Result<String, String> {
+    let facts = facts(path)?;
+    let value = value_of_settings(&model.settings, path);
+    let value = value.ok_or_else(|| format!("`{path}` {NOT_TOLD}"))?;
+    let text = facts.text(&value).ok_or_else(|| format!("`{path}` is not set"))?;
+    Ok(format!("{path} = {text}"))
 }
 
 #[cfg(test)]
@@ -83,6 +97,10 @@ mod tests {
         (expected.probe.depth, expected.imaging.gain) = (77.0, 3.0);
         assert!(after == expected);
         assert_eq!(told("get probe.depth").0, Ok("probe.depth = \"77 mm\"".to_owned()));
+        let table = told("get imaging").0.expect("a table");
+        assert!(table.contains("imaging.gain = \"3 dB\"\n"), "{table}");
+        assert!(table.contains("imaging.dynamic_range = "), "{table}");
+        assert!(told("get tissues.liver").0.is_err_and(|e| e.contains("serve")));
         for (wrong, cause) in [
             ("probe.dept = 3", "depth"),
             ("imaging.gain = 900", "between"),

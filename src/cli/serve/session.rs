@@ -144,6 +144,19 @@ impl<'a> Session<'a> {
     }
 
     fn get(&self, path: &str) -> Result<String, String> {
+        let keys = file::keys_below(path);
+        match keys.is_empty() {
+            true => self.value(path),
+            false => {
+                let set: Vec<String> = keys.iter().filter_map(|key| self.value(key).ok()).collect();
+                let none = || format!("nothing of `{path}` is set in {}", self.path.display());
+                if set.is_empty() { Err(none()) } else { Ok(set.join("\n")) }
+            }
+        }
+    }
+
+    /// The value of a key.
+    fn value(&self, path: &str) -> Result<String, String> {
         let facts = file::facts(path)?;
         let text = match file::value(&self.scene, path) {
             Some(value) => facts.text(&value),

@@ -27,6 +27,20 @@ pub fn facts(path: &str) -> Result<&'static Facts, String> {
     }
 }
 
+/// Paths of the keys of the table at a path, and of the tables in it: of `tissues.liver` its speed and all others; none where
+/// there is no such table.
+pub fn keys_below(path: &str) -> Vec<String> {
+    let given = segments(path);
+    let below = |known: String| {
+        let all = segments(&known);
+        let rest = all.get(given.len()..).filter(|rest| !rest.is_empty())?;
+        let fits = |(known, given): (&String, &String)| known == given || known == "NAME";
+        let is_below = all.iter().zip(&given).all(fits) && !rest.contains(&"NAME".to_owned());
+        is_below.then(|| format!("{path}.{}", rest.join(".")))
+    };
+    paths().filter_map(below).collect()
+}
+
 /// The value of a key in `scene`; none of keys that a scene holds in another form, as those of geometry.
 pub fn value(scene: &Scene, path: &str) -> Option<Value> {
     let parts = segments(path);
@@ -72,5 +86,10 @@ mod tests {
         }
         assert!(facts("imaging.gian").unwrap_err().contains("did you mean `gain`?"));
         assert!(facts("imaging").unwrap_err().contains("is a table"));
+        let keys = keys_below("imaging");
+        assert!(keys.contains(&"imaging.gain".to_owned()), "{keys:?}");
+        assert!(keys.iter().all(|key| facts(key).is_ok()), "{keys:?}");
+        assert!(keys_below("tissues.liver").contains(&"tissues.liver.speed".to_owned()));
+        assert_eq!((keys_below("imaging.gain"), keys_below("nothing")), (vec![], vec![]));
     }
 }
