@@ -112,6 +112,11 @@ pub fn run(args: &Import) -> Result<()> {
         distinct(&given, &[("-o", Some(folder))])?;
         return trajectory(source, folder, args);
     }
+    if ends(folder, "toml") && !folder.is_dir() {
+        let own = folder.with_extension("");
+        let remedy = format!("take `-o {}`: scene.toml is written into it", own.display());
+        return Err(miette!(help = remedy, "-o {}: it names a folder", folder.display()));
+    }
     if ends(source, "xml") {
         return device_set(source, folder, args);
     }

@@ -56,6 +56,9 @@ fn a_folder_of_meshes_becomes_a_scene() {
     let (done, said) = insonify(folder, &["import", "organs", "-o", "b"]);
     assert!(!done && said.contains("bad.obj") && said.contains("do not exist yet"), "{said}");
     std::fs::create_dir(folder.join("empty")).expect("made");
+    let (done, said) = insonify(folder, &["import", "organs", "-o", "b.toml"]);
+    assert!(!done && said.contains("names a folder") && said.contains("`-o b`"), "{said}");
+    assert!(!folder.join("b.toml").exists());
     let (done, said) = insonify(folder, &["import", "empty", "-o", "b"]);
     assert!(!done && said.contains("holds no mesh"), "{said}");
 }
