@@ -345,9 +345,11 @@ impl Simulator {
         Ok(began.elapsed())
     }
 
-    /// True if the first frame will wait for the driver's compiler, because its kernels have never run here.
-    pub fn compiles(&self) -> bool {
-        self.passes.kernels.of(&SCATTER, self.passes.world.deforms()).is_new()
+    /// True if the next frame of `scene` will wait for the driver's compiler, because its kernels have never run here.
+    pub fn compiles(&self, scene: &Scene) -> bool {
+        let longest = [&SCATTER].into_iter().chain(scene.simulation.labels.then_some(&LABEL));
+        let deforms = self.passes.world.deforms();
+        longest.into_iter().any(|pass| self.passes.kernels.of(pass, deforms).is_new())
     }
 
     /// Builds the pipelines again from `library`'s kernels, after the frames in flight.

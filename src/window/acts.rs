@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use egui::{Event, Modifiers};
+use egui::{Event, Key, Modifiers};
 
 use super::files::Purpose;
 use super::keys::{Action, action};
@@ -26,6 +26,10 @@ pub(super) fn apply(ctx: &egui::Context, model: &mut Model, state: &mut State, n
         });
         presses.collect::<Vec<_>>()
     });
+    let typed = |key: Key, modifiers: Modifiers| {
+        state.common.fills && !modifiers.command && (key == Key::Space || key.name().len() == 1)
+    };
+    let pressed: Vec<_> = pressed.into_iter().filter(|&(key, held)| !typed(key, held)).collect();
     for (key, modifiers) in pressed {
         if let Some(action) = action(key, modifiers) {
             carry_out(action, modifiers, model, state, now);

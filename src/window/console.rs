@@ -100,7 +100,8 @@ impl Console {
             true => drop(ui.label(EXAMINED)),
             false => poses::show(ui, desk.model, &mut self.poses, now),
         });
-        section(ui, "Animation", false, |ui| animation::show(ui, desk.model, now));
+        let shown = desk.seen.frame.map(|frame| frame.seconds);
+        section(ui, "Animation", false, |ui| animation::show(ui, desk.model, shown, now));
         section(ui, "Probe input", false, |ui| input::show(ui, desk));
         let (settings, lattice) = (&mut desk.model.settings, desk.model.file.lattice);
         section(ui, "Simulation", false, |ui| {

@@ -1,7 +1,7 @@
 //! The worksheet of the examination, and its report.
 
 use dicom_core::chrono::Local;
-use egui::{Grid, Key, RichText, ScrollArea, TextEdit, Ui};
+use egui::{Context, Grid, Key, RichText, ScrollArea, TextEdit, Ui};
 
 use super::model::Model;
 use super::model::sheet::What;
@@ -73,8 +73,22 @@ impl Panel for Examination {
         &ROW
     }
 
+    fn follow(&mut self, ctx: &Context, desk: &mut Desk<'_>) {
+        // Set again below, where the click is into the open form.
+        if ctx.input(|input| input.pointer.any_pressed())
+            || !self.is_open(desk.model, &desk.common.open)
+        {
+            desk.common.fills = false;
+        }
+    }
+
     fn show(&mut self, ui: &mut Ui, desk: &mut Desk<'_>) {
         let Desk { model, common, .. } = desk;
+        let pressed =
+            ui.input(|input| input.pointer.any_pressed().then(|| input.pointer.press_origin()));
+        if let Some(Some(at)) = pressed {
+            common.fills |= ui.max_rect().contains(at);
+        }
         let tools = &mut common.tools;
         let sheet = worksheet(model);
         ui.add_space(6.0);

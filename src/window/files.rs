@@ -2,13 +2,13 @@
 
 mod dialog;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use egui::{RichText, Ui};
 
 use super::model::Model;
 use super::style::{self, button};
-use crate::scene::SceneError;
+use crate::scene::{SceneError, shipped};
 use dialog::Dialog;
 pub(super) use dialog::show as dialog;
 
@@ -34,7 +34,11 @@ pub(super) enum Purpose {
 impl Files {
     /// Asks the user for a file.
     pub(super) fn ask(&mut self, purpose: Purpose, model: &Model) {
-        self.dialog = Some(Dialog::new(purpose, &model.file.path));
+        // A scene that ships is not written over: a name of its own, in the folder of the session.
+        let path = &model.file.path;
+        let shipped = purpose == Purpose::Save && shipped::is_shipped(path);
+        let own = shipped.then(|| free(path));
+        self.dialog = Some(Dialog::new(purpose, own.as_deref().unwrap_or(path)));
     }
 
     /// Returns whether the user is being asked for a file.
@@ -44,6 +48,9 @@ impl Files {
 
     /// Saves into the session's file; asks for another one where that fails.
     pub(super) fn save(&mut self, model: &mut Model) {
+        if shipped::is_shipped(&model.file.path) {
+            return self.ask(Purpose::Save, model);
+        }
         if let Err(error) = model.save(None, self.with_pose) {
             self.ask(Purpose::Save, model);
             let shown = self.refuse(message_of(&error));
@@ -66,6 +73,17 @@ impl Files {
     pub(super) fn close(&mut self) {
         self.dialog = None;
     }
+}
+
+/// A name like that of a scene which no file in the present folder has.
+fn free(scene: &Path) -> PathBuf {
+    let stem = scene.file_stem().unwrap_or_default().to_string_lossy();
+    let names = (1..).map(|n| match n {
+        1 => PathBuf::from(format!("{stem}.toml")),
+        n => PathBuf::from(format!("{stem}-{n}.toml")),
+    });
+    let mut free = names.filter(|name| !name.exists());
+    free.next().expect("numbers do not end")
 }
 
 /// The text of an error: place, cause and remedy.

@@ -260,7 +260,8 @@ fn images(
             None
         }
     };
-    let (sheet, listens) = (&mut model.sheet, !state.has_dialog());
+    let listens = !state.has_dialog() && !state.common.fills;
+    let sheet = &mut model.sheet;
     let kind = model.settings.imaging.exam;
     if let (Some(place), Some(frame)) = (&place, frame) {
         calipers::show(ui, sheet, place, frame, (kind, listens, false));
@@ -286,6 +287,9 @@ fn images(
     }
     if let Some(place) = &place {
         beside::show(ui, place, model, now);
+    }
+    if state.prepares && frame.is_some() {
+        notice::preparing(ui, state.preparing);
     }
     notice::show(ui, &mut state.common.inputs);
     notice::recording(ui, model, now);

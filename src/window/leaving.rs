@@ -10,6 +10,7 @@ use super::state::State;
 use super::style::{self, button};
 use super::unsaved::Unsaved;
 use super::way::{Leaving, Stage, Way};
+use crate::scene::shipped;
 
 /// Width of the question, points.
 const WIDTH: f32 = 400.0;
@@ -17,7 +18,10 @@ const WIDTH: f32 = 400.0;
 /// What is unsaved, and where saving puts it.
 fn lines(unsaved: &Unsaved, model: &Model, state: &State) -> Vec<String> {
     let scene = name(&model.file.path);
-    let settings = unsaved.settings.then(|| format!("Settings: into {scene}"));
+    let settings = unsaved.settings.then(|| match shipped::is_shipped(&model.file.path) {
+        true => format!("Settings: into a file of your own, as {scene} ships"),
+        false => format!("Settings: into {scene}"),
+    });
     let way = unsaved.trajectory.then(|| {
         let seconds = match (&model.trajectory.recorder, model.unsaved_trajectory()) {
             (Some(recorder), _) => recorder.seconds(Instant::now()),

@@ -47,13 +47,15 @@ pub(super) struct MmodePanel {
     pub(super) spans: Vec<Span>,
     /// The last of them is being drawn.
     drawing: bool,
+    /// The line of the last strip.
+    aim: Option<Aim>,
     /// The strip on the device, and its content: revision, seconds across, pixels across.
     texture: Option<(TextureHandle, (u64, f64, usize))>,
 }
 
 impl Default for MmodePanel {
     fn default() -> Self {
-        Self { window: 2.0, spans: Vec::new(), drawing: false, texture: None }
+        Self { window: 2.0, spans: Vec::new(), drawing: false, aim: None, texture: None }
     }
 }
 
@@ -100,14 +102,23 @@ impl Panel for MmodePanel {
     fn toggle(&self, model: &mut Model, _open: &mut OpenPanels, now: Instant) {
         model.mmode = match model.mmode {
             Some(_) => None,
-            None => Some(Strip::new(Aim::Scanline(model.settings.probe.scanlines / 2))),
+            None => {
+                let middle = Aim::Scanline(model.settings.probe.scanlines / 2);
+                Some(Strip::new(self.aim.unwrap_or(middle)))
+            }
         };
         model.touch(now);
     }
 
     fn follow(&mut self, _ctx: &Context, desk: &mut Desk<'_>) {
-        if desk.model.mmode.is_none() {
+        let Some(strip) = &desk.model.mmode else {
             self.texture = None;
+            return;
+        };
+        self.aim = Some(strip.line());
+        // Of a strip that begins anew nothing is measured.
+        if strip.newest().is_none() {
+            self.spans.clear();
         }
     }
 

@@ -42,6 +42,17 @@ pub(super) fn show(ui: &Ui, inputs: &mut Inputs) {
     }
 }
 
+/// Draws what the next image waits for.
+pub(super) fn preparing(ui: &Ui, what: &str) {
+    let (painter, area) = (ui.painter(), ui.max_rect());
+    let words = painter.layout_no_wrap(what.to_owned(), FontId::proportional(14.0), style::TEXT);
+    let badge =
+        Rect::from_center_size(area.center_top() + vec2(0.0, 74.0), words.size() + vec2(20.0, 8.0));
+    painter.rect_filled(badge, 4.0, Color32::from_black_alpha(210));
+    let at = Align2::CENTER_CENTER.align_size_within_rect(words.size(), badge);
+    painter.galley(at.min, words, style::TEXT);
+}
+
 /// Draws a red sign beside the word for live or frozen while the probe's trajectory is being recorded.
 pub(super) fn recording(ui: &Ui, model: &Model, now: Instant) {
     let Some(recorder) = &model.trajectory.recorder else {

@@ -33,6 +33,9 @@ mod scenes;
 /// after so long. On a slow device the time then goes to the simulation.
 const DRAWING_PUT_OFF: u32 = 8;
 
+/// The answer to a client who wants another scene while something is unsaved.
+const ASKED: &str = "waiting for the user, whom the window asks what becomes of unsaved work";
+
 /// A window with its simulation and the user's state.
 pub(super) struct Open {
     /// The last finished picture; declared before the session, so that its device still exists when it is dropped.
@@ -111,7 +114,7 @@ impl Open {
             pictures_only &= matches!(news, News::View3d(_));
             match news {
                 News::Frame(frame, film) => {
-                    self.awaited = false;
+                    (self.awaited, self.state.prepares) = (false, false);
                     self.model.follow(Instant::now());
                     if self.frame.is_none() {
                         self.model.begin_replay(Instant::now());
@@ -128,6 +131,7 @@ impl Open {
                     self.model.film_columns(&probe, aim, columns);
                 }
                 News::Anew(frame) => {
+                    self.state.prepares = false;
                     self.state.common.tools.put_back(&frame);
                     self.state.dual.refine(&frame);
                 }
@@ -136,9 +140,9 @@ impl Open {
                     self.state.panels.view3d.learn(&pictured);
                     self.pictured = Some(*pictured);
                 }
-                News::Preparing(what) => self.state.preparing = what,
+                News::Preparing(what) => (self.state.preparing, self.state.prepares) = (what, true),
                 News::Refused(problem) => {
-                    self.awaited = false;
+                    (self.awaited, self.state.prepares) = (false, false);
                     self.state.problem = Some(problem);
                 }
                 News::Opened => self.adopt(plan),
@@ -248,9 +252,12 @@ impl Open {
         }
         while let Some(request) = self.state.common.inputs.request() {
             let (now, mut wanted) = (Instant::now(), None);
-            let outcome = orders::carry_out(&request.order, &mut self.model, &mut wanted, now);
+            let mut outcome = orders::carry_out(&request.order, &mut self.model, &mut wanted, now);
             if let Some(path) = wanted {
                 leaving::leave(Way::Open(path), &mut self.model, &mut self.state, now);
+                if self.state.leaving.is_some() {
+                    outcome = Ok(ASKED.to_owned());
+                }
             }
             request.answer(outcome);
             self.window.request_redraw();

@@ -165,6 +165,8 @@ pub(super) struct Common {
     pub(super) warnings: Vec<String>,
     /// True while these are shown.
     pub(super) warned: bool,
+    /// True where the last click was into a form: letters beside its fields are no keys then.
+    pub(super) fills: bool,
     /// Called by threads of panels that have something to show.
     pub(super) wake: Wake,
     /// What is asked of the window.

@@ -9,6 +9,9 @@ use super::style;
 use crate::gpu::Image;
 use crate::scene::palette;
 
+/// Distance of the legends from the upper edge, below the texts there, points.
+const LEGEND: f32 = 64.0;
+
 /// The image of a frame to be shown.
 pub(super) fn image<'f>(frame: &'f Frame, model: &Model) -> &'f Image {
     let painted = frame.painted.as_ref().filter(|_| model.layer.shown);
@@ -24,7 +27,7 @@ pub(super) fn tissues(painter: &egui::Painter, area: Rect, frame: &Frame, model:
     let used = |index: &usize| {
         *index == model.background || model.meshes.iter().any(|m| m.tissue == *index)
     };
-    let mut y = area.top() + 49.0;
+    let mut y = area.top() + LEGEND;
     for index in (0..frame.settings.tissues.len()).filter(used) {
         let name = &frame.settings.tissues[index].name;
         let at = pos2(area.right() - 12.0, y);
@@ -51,7 +54,7 @@ pub(super) fn legend(painter: &egui::Painter, area: Rect, frame: &Frame, model: 
     }
     let font = FontId::proportional(12.0);
     let mut right = area.right() - 12.0;
-    let y = area.top() + 49.0;
+    let y = area.top() + LEGEND;
     // From the right, below the texts there.
     let text = |x: f32, words: &str| {
         let at = pos2(x, y);

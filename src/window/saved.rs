@@ -27,6 +27,16 @@ impl Notices {
         self.saved.push((text, Instant::now() + SHOWN));
     }
 
+    /// Takes away what was said of the capture before another one.
+    pub(super) fn begin(&mut self) {
+        self.failed = None;
+    }
+
+    /// Takes away messages that are true no longer.
+    pub(super) fn outdate(&mut self) {
+        self.saved.clear();
+    }
+
     /// Returns whether the last capture was not saved.
     pub(super) fn has_failed(&self) -> bool {
         self.failed.is_some()

@@ -31,8 +31,10 @@ pub(super) struct State {
     pub(super) stopped: bool,
     /// True where the simulation is to be started again.
     pub(super) restart: bool,
-    /// The work being done before the first picture.
+    /// The work being done before the first picture, or before another one that takes longer than usual.
     pub(super) preparing: &'static str,
+    /// True while it is being done.
+    pub(super) prepares: bool,
     /// A way out on which something unsaved would be lost.
     pub(super) leaving: Option<Leaving>,
     /// Keeps what is unsaved.

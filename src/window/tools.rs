@@ -147,11 +147,13 @@ impl Tools {
 
     /// Saves the shown image, once it has been drawn with its marks.
     pub(super) fn want_still(&mut self) {
+        self.notices.begin();
         (self.due, self.last) = (Some(Wanted::Still), Wanted::Still);
     }
 
     /// Saves the marked part of the loop.
     pub(super) fn want_clip(&mut self) {
+        self.notices.begin();
         (self.due, self.last) = (Some(Wanted::Clip), Wanted::Clip);
     }
 

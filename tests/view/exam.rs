@@ -57,6 +57,18 @@ fn a_measured_still_has_no_buttons_and_stands_in_the_report() {
     for part in ["small parts", "Cyst and wires", "data:image/png;base64,", "0001-marked"] {
         assert!(text.contains(part), "{part}");
     }
+
+    // Letters that are typed beside a field of the form are no keys; after a click into the image they are.
+    let console = [1280 - 336, 0, 336, 670];
+    let shut = desk.grab(console);
+    desk.click((150, 600));
+    desk.press(Key::Letter('c'));
+    desk.still(console);
+    assert!(difference(&desk.grab(console), &shut) < 1.0, "the console stays shut");
+    desk.press(Key::Letter('l'));
+    desk.click((700, 600));
+    desk.press(Key::Letter('c'));
+    desk.wait_for("the console", |d| difference(&d.grab(console), &shut) > 5.0);
     desk.quit();
 }
 

@@ -151,11 +151,12 @@ impl Score {
             out.push(format!(
                 "path {path_mm:.0} mm, {peaks} peaks of movement, turned by {angle_deg:.0}\u{b0}"
             ));
-            out.push(ANCHORS.to_owned());
         }
         if let (Some(distance), Some(plane), Some(turn)) =
             (self.distance_mm, self.plane_angle_deg, self.turn_deg)
         {
+            // They were asked for a view.
+            out.extend((seconds > 0.0).then(|| ANCHORS.to_owned()));
             out.push(format!(
                 "at the end {distance:.1} mm beside the view, its plane {plane:.1}\u{b0} off, turned {turn:.1}\u{b0}"
             ));

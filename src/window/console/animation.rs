@@ -11,7 +11,8 @@ use crate::settings::units::DURATION;
 use crate::sim::Tracer;
 use crate::style::button;
 
-pub(super) fn show(ui: &mut Ui, model: &mut Model, now: Instant) {
+/// `shown` is the time of the image, s.
+pub(super) fn show(ui: &mut Ui, model: &mut Model, shown: Option<f64>, now: Instant) {
     if !model.animated {
         ui.label("Nothing in this scene moves.");
         return;
@@ -22,7 +23,9 @@ pub(super) fn show(ui: &mut Ui, model: &mut Model, now: Instant) {
             model.clock.play(!model.clock.is_playing(), now);
             model.touch(now);
         }
-        let mut seconds = model.clock.at(now);
+        // The last input may be long ago.
+        let running = shown.filter(|_| model.clock.runs());
+        let mut seconds = running.unwrap_or_else(|| model.clock.at(now));
         let time = DragValue::new(&mut seconds).speed(0.02).fixed_decimals(2).suffix(" s");
         let time = time.custom_parser(|text| DURATION.finite(text).ok());
         if ui.add(time).on_hover_text("The scene's time: drag or type").changed() {

@@ -85,6 +85,12 @@ pub(super) struct Worker {
     wake: Wake,
 }
 
+/// Hands news to the window.
+fn told(shared: &Shared, wake: &Wake, news: News) {
+    shared.state.lock().news.push(news);
+    wake();
+}
+
 impl Worker {
     pub(super) fn new(
         device: &Arc<Device>,
@@ -259,13 +265,10 @@ impl Worker {
     }
 
     fn tell(&self, news: News) {
-        let mut state = self.shared.state.lock();
         if matches!(news, News::Frame(..)) && self.device.shares_queue() {
-            state.undrawn.get_or_insert_with(Instant::now);
+            self.shared.state.lock().undrawn.get_or_insert_with(Instant::now);
         }
-        state.news.push(news);
-        drop(state);
-        (self.wake)();
+        told(&self.shared, &self.wake, news);
     }
 
     /// The newest order once there is one, or the last one again while its image changes by itself; at rest

@@ -92,7 +92,10 @@ impl Open {
                 self.coming = Some(opened);
             }
             // The session goes on with what was read before.
-            (Err(problem), Purpose::Again) => self.state.stale = Some(problem),
+            (Err(problem), Purpose::Again) => {
+                self.state.common.tools.notices.outdate();
+                self.state.stale = Some(problem);
+            }
             (Err(problem), Purpose::Open) => self.refuse(problem),
         }
     }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
-use super::{Imaged, Taken, Worker};
+use super::{Imaged, Taken, Worker, told};
 use crate::engine::News;
 use crate::gpu::Abandon;
 use crate::look::Pictured;
@@ -86,7 +86,7 @@ impl Worker {
             *simulator = None;
             self.tell(News::Preparing(UPLOADING));
             let made = Simulator::new(&self.device, &self.library, &self.scene, tracer)?;
-            self.tell(News::Preparing(match made.compiles() {
+            self.tell(News::Preparing(match made.compiles(&self.scene) {
                 true => COMPILING,
                 false => FIRST,
             }));
@@ -156,6 +156,9 @@ impl Worker {
             tinted: tinted.as_ref().map(|(image, tint)| (image, *tint)),
             painted: painted.as_ref().map(|(image, opacity)| (image, *opacity)),
         };
+        if self.left.is_some() && simulator.compiles(scene) {
+            told(&self.shared, &self.wake, News::Preparing(COMPILING));
+        }
         simulator.frames_into(scene, &[Shot::of(scene, index)], &outputs)?;
         let timings = simulator.wait()?.pop().unwrap_or_default();
         let wall = began.elapsed();
