@@ -74,10 +74,12 @@ impl Panel for Examination {
     }
 
     fn follow(&mut self, ctx: &Context, desk: &mut Desk<'_>) {
-        // Set again below, where the click is into the open form.
-        if ctx.input(|input| input.pointer.any_pressed())
-            || !self.is_open(desk.model, &desk.common.open)
-        {
+        // Set again below, where the click is into the open form. Enter and Esc end what is typed into it.
+        let ends = ctx.input(|input| {
+            let keys = [Key::Enter, Key::Escape];
+            input.pointer.any_pressed() || keys.iter().any(|key| input.key_pressed(*key))
+        });
+        if ends || !self.is_open(desk.model, &desk.common.open) {
             desk.common.fills = false;
         }
     }
