@@ -89,7 +89,7 @@ fn enhanced(bench: &Bench, physics: Physics) -> Outcome {
         out.compare(format!("{name}: deviation, edges enhanced by {a}"), measured, expected, 0.05);
     }
     let reduced = levels(1.0, 0.0);
-    // What varies more than speckle on the average is smoothed less.
+    // Samples whose neighbourhood varies more than speckle does on the average are smoothed less.
     let measured = deviation(&reduced) / own / r.sqrt();
     out.compare(format!("{name}: deviation of reduced speckle over the least"), measured, 1.1, 0.1);
     out.compare(
