@@ -40,14 +40,14 @@ pub(super) struct Histogram {
     chosen: Option<char>,
 }
 
-/// Statistics of a region.
+/// Greys of a region.
 #[derive(Clone, Debug, PartialEq)]
 struct Region {
     /// Pixels of each grey.
     greys: [u32; GREYS],
 }
 
-/// What greys say of the echoes behind them.
+/// Figures of the echoes behind the greys of a region.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Speckle {
     /// Mean grey.
@@ -82,7 +82,7 @@ impl Region {
         self.greys.iter().sum()
     }
 
-    /// What its greys say, by the grey map of the settings; none of too few pixels.
+    /// Figures of its echoes, by the grey map of the settings; none of too few pixels.
     fn speckle(&self, imaging: &Imaging) -> Option<Speckle> {
         let pixels = self.pixels();
         if pixels < LEAST {

@@ -1,6 +1,8 @@
 //! The image with its marks, as it is saved: at its own size, with what a scanner writes around it, the measurements beside it
 //! and nothing that is pressed, whatever the window looks like.
 
+use std::sync::Arc;
+
 use egui::{Context, Pos2, RawInput, Rect, Ui, UiBuilder, Vec2, pos2, vec2};
 
 use super::model::Model;
@@ -11,7 +13,6 @@ use super::state::State;
 use super::{bmode, body, calipers, ecg, mmode, real, style};
 use crate::gpu::{Device, GpuError, InterfaceFrame, PlacedImage, Screenshot, picture};
 use crate::settings::Exam;
-use std::sync::Arc;
 
 /// Width of the column of measurements, points.
 const TABLE: f32 = 250.0;

@@ -42,7 +42,7 @@ pub(super) fn show(ui: &Ui, inputs: &mut Inputs) {
     }
 }
 
-/// Draws what the next image waits for.
+/// Draws the work that the next image waits for.
 pub(super) fn preparing(ui: &Ui, what: &str) {
     let (painter, area) = (ui.painter(), ui.max_rect());
     let words = painter.layout_no_wrap(what.to_owned(), FontId::proportional(14.0), style::TEXT);

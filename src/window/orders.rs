@@ -54,7 +54,7 @@ pub(super) fn carry_out(
     }
 }
 
-/// Why the value of a key is not in the answer.
+/// Reason why the value of a key is not in the answer.
 const NOT_TOLD: &str = "is not told by a window; `insonify serve` tells it";
 
 /// The value of a key.

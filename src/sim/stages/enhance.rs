@@ -16,21 +16,21 @@ use crate::settings::Processing;
 pub const SPECKLE_DEVIATION: f64 = 5.57;
 
 /// Mean and mean square across the scanlines, by scanline and sample.
-pub const MOMENT: Array = Array::new("moments", Float, 2, Sizes::samples);
+pub const MOMENTS: Array = Array::new("moments", Float, 2, Sizes::samples);
 
 /// The stages: moments across the scanlines, then along them and the image from both.
 pub const ENHANCE: [Pass; 2] = [
     Pass {
         name: "moments",
-        binds: &[&FRAME, &ROWS, &LOG_IMAGE, &MOMENT],
-        makes: &[&MOMENT],
+        binds: &[&FRAME, &ROWS, &LOG_IMAGE, &MOMENTS],
+        makes: &[&MOMENTS],
         extent: Some(|f| Extent::Threads([f.samples, f.scanlines.div_ceil(BEAM_LINES), 1])),
         needed: |scene| scene.processing.is_on(),
         ..Pass::USUAL
     },
     Pass {
         name: "enhance",
-        binds: &[&FRAME, &MOMENT, &LOG_IMAGE],
+        binds: &[&FRAME, &MOMENTS, &LOG_IMAGE],
         extent: Some(|f| Extent::Threads([f.samples.div_ceil(AXIAL_SAMPLES), f.scanlines, 1])),
         needed: |scene| scene.processing.is_on(),
         ..Pass::USUAL

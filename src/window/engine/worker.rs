@@ -136,14 +136,18 @@ impl Worker {
                 Job::Image(order) => self.taken(order, index),
                 Job::Columns(order) => {
                     let taken = self.taken(order, index);
-                    let columns = self.columns(&mut simulator, &taken);
-                    let told = columns.map(|film| match film {
-                        Some(Film::Columns(aim, columns)) => {
+                    let told = match self.columns(&mut simulator, &taken) {
+                        Ok(Some(Film::Columns(aim, columns))) => {
                             let probe = taken.order.settings.probe.clone();
-                            News::Columns(Box::new(probe), aim, columns)
+                            Ok(News::Columns(Box::new(probe), aim, columns))
                         }
-                        _ => unreachable!("those of a scanline"),
-                    });
+                        // The strip has none of its own: an image is due.
+                        Ok(_) => {
+                            self.took = Duration::ZERO;
+                            continue;
+                        }
+                        Err(error) => Err(error),
+                    };
                     if !self.report(told, false) {
                         return;
                     }

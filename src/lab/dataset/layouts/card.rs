@@ -21,7 +21,7 @@ impl Licence {
     }
 }
 
-/// What samples add up to.
+/// Sums over samples.
 pub(super) struct Totals {
     /// Pixels of each class, and samples that show it.
     classes: Vec<[u64; 2]>,

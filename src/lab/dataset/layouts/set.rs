@@ -33,7 +33,7 @@ pub(super) struct Labelled {
     /// Its number as text, as its files are named.
     pub(super) name: String,
     pub(super) split: String,
-    /// What its `.json` says.
+    /// The content of its `.json`.
     pub(super) facts: Value,
     /// The image, PNG.
     pub(super) image: Vec<u8>,

@@ -54,7 +54,7 @@ trait Checked {
     /// Fails at the first value out of its range; `table` is written as in the reference.
     fn check(&self, document: &Document<'_>, table: &str) -> Result<(), SceneError>;
 
-    /// What is stated, where there is one such table.
+    /// The stated values, where there is one such table.
     fn stated(&self) -> Option<&Stated> {
         None
     }
@@ -126,7 +126,7 @@ macro_rules! tables {
                 Ok(())
             }
 
-            /// What the file states in a table that every file has.
+            /// The values that the file states in a table that every file has.
             pub fn stated(&self, table: &str) -> Option<&Stated> {
                 match table {
                     $($table => Checked::stated(&self.$field),)+

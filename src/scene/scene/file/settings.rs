@@ -30,7 +30,7 @@ pub(super) fn settings(
     Ok(settings)
 }
 
-/// What a file states of each group but the probe, which is more than its rows.
+/// The values that a file states of each group but the probe, which is more than its rows.
 struct Stating<'s> {
     file: &'s File,
     settings: &'s mut Settings,
