@@ -98,6 +98,10 @@ class Scene:
     def load(path: str | PathLike[str], overrides: Mapping[str, Any] | None = None) -> Scene:
         """The scene of a file, or one that ships by its name ("abdomen"), with `overrides` as of `--set`. SceneError: a
         mistake, with file, line and remedy."""
+    def save(self, path: str | PathLike[str]) -> None:
+        """Writes the scene as a scene file: the text that it was made of, everything that was set, its pose, and meshes of arrays
+        as files beside it. Not its time. SceneError, OSError: a file that cannot be written, and one that ships; ValueError:
+        a mesh that was placed by place()."""
     def __getitem__(self, key: str) -> Any:
         """The value of a key; None where it is not set and has no default. KeyError: scene files have no such key."""
     def __setitem__(self, key: str, value: Any) -> None:

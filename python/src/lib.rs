@@ -14,6 +14,7 @@ mod pickle;
 mod process;
 mod running;
 mod save;
+mod saving;
 mod scene;
 mod simulator;
 mod state;

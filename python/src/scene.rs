@@ -76,6 +76,14 @@ impl Scene {
         Self::made(py.detach(load))
     }
 
+    /// Writes the scene as a scene file: the text that it was made of, everything that was set, its pose, and meshes of arrays
+    /// as files beside it. Not its time. SceneError, OSError: a file that cannot be written, and one that ships; ValueError:
+    /// a mesh that was placed by place().
+    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        let state = self.lock(py);
+        crate::saving::save(&state, &path)
+    }
+
     /// The value of a key; None where it is not set and has no default. KeyError: scene files have no such key.
     fn __getitem__<'py>(&self, py: Python<'py>, key: &str) -> PyResult<Bound<'py, PyAny>> {
         let facts = file::facts(key).map_err(PyKeyError::new_err)?;

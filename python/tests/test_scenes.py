@@ -202,3 +202,41 @@ def test_a_time_is_finite(scene):
     assert scene.time == 1.5
     with pytest.raises(ValueError, match="no time"):
         scene.time = float("inf")
+
+
+def test_a_scene_is_saved_with_its_meshes_and_imaged_alike(tmp_path):
+    scene = ball()
+    scene["imaging.gain"] = "21 dB"
+    scene["tissues.liver.attenuation"] = 0.6
+    scene.save(tmp_path / "mine.toml")
+    again = insonify.Scene.load(tmp_path / "mine.toml")
+    assert (tmp_path / "mine-ball.obj").exists()
+    assert again["imaging.gain"] == 21 and again["tissues.liver.attenuation"] == 0.6
+    images = []
+    for one in [scene, again]:
+        with insonify.Simulator(one, tracer="bvh") as simulator:
+            images.append(simulator.frame(want=["iq"]).iq)
+    assert (images[0] == images[1]).all()
+
+    # In another folder files are named from there; the pose is the one that was set.
+    pose = np.eye(4)
+    pose[0, 3] = 3.25
+    again.pose = pose
+    (tmp_path / "deep").mkdir()
+    again.save(tmp_path / "deep" / "other.toml")
+    other = insonify.Scene.load(tmp_path / "deep" / "other.toml")
+    np.testing.assert_allclose(other.pose, pose, atol=1e-4)
+    assert other.meshes == ["ball"] and not list((tmp_path / "deep").glob("*.obj"))
+
+    # Vertices are saved where they are; a placement by hand is none of a file's.
+    vertices, _ = sphere(centre=(0, 0, 20))
+    scene.set_vertices("ball", vertices + [0, 0, 1])
+    scene.save(tmp_path / "moved.toml")
+    text = (tmp_path / "moved-ball.obj").read_text()
+    x, y, z = map(float, text.splitlines()[1].split()[1:])
+    np.testing.assert_array_equal(np.float32([x, y, z]), np.float32(vertices[0] + [0, 0, 1]))
+    scene.place("ball", np.eye(4))
+    with pytest.raises(ValueError, match="mesh.ball.translate"):
+        scene.save(tmp_path / "placed.toml")
+    with pytest.raises(insonify.SceneError, match="folder"):
+        again.save(tmp_path / "nowhere" / "a.toml")

@@ -131,7 +131,7 @@ pub type Prepare = Box<dyn Fn(&Arc<Device>, &mut Scene) -> Result<Tracer, Refusa
 
 /// What to do first, in three lines.
 pub const FIRST_STEPS: [&str; 3] = [
-    "Drag the probe on the skin in the 3D view; Shift leans it, Ctrl and the wheel turn it.",
+    "Drag the probe on the skin in the 3D view, or slide it by the arrow keys; Shift leans it, Ctrl and the wheel turn it.",
     "Space freezes the image, L measures a distance in it, F2 saves it with its settings.",
     "The console has gain, depth and all other settings; ? lists the keys.",
 ];
