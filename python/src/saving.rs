@@ -1,16 +1,15 @@
 //! A scene of Python as a scene file, with the meshes that were given as arrays beside it.
 
 use std::collections::BTreeSet;
-use std::fmt::Write as _;
 use std::path::Path;
 
-use insonify::output::files;
+use insonify::output::{files, naming, obj};
 use insonify::scene::file::{self, Entry, quoted, stated_pose};
 use pyo3::exceptions::{PyOSError, PyValueError};
 use pyo3::prelude::*;
 
 use crate::error::mistaken;
-use crate::state::{Given, State};
+use crate::state::State;
 
 /// Writes the scene as the file `to`: the text that it was made of, with everything that was set, its pose, and its meshes of
 /// arrays as files beside it.
@@ -33,7 +32,7 @@ pub fn save(state: &State, to: &Path) -> PyResult<()> {
         let file = free(to, name, &mut names);
         let positions = state.moved.get(name).unwrap_or(&given.positions);
         let path = to.with_file_name(&file);
-        files::replace(&path, obj(positions, given).as_bytes())
+        files::replace(&path, obj::text("mm", positions, &given.triangles).as_bytes())
             .map_err(|e| PyOSError::new_err(format!("{}: {e}", path.display())))?;
         let of = |key: &str| format!("mesh.{}.{key}", quoted(name));
         meshes.push((of("file"), Some(format!("\"{file}\""))));
@@ -53,24 +52,8 @@ fn free(scene: &Path, mesh: &str, names: &mut BTreeSet<String>) -> String {
     let plain = |text: &str| -> String {
         text.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect()
     };
-    let name = format!("{}-{}", plain(&stem), plain(mesh));
-    let mut all = (1..).map(|n| match n {
-        1 => format!("{name}.obj"),
-        n => format!("{name}-{n}.obj"),
-    });
-    all.find(|name| names.insert(name.clone())).expect("numbers do not end")
-}
-
-/// A mesh as text, from which every coordinate is read back to the last bit.
-fn obj(positions: &[[f32; 3]], given: &Given) -> String {
-    let mut out = String::from("# mm\n");
-    for [x, y, z] in positions {
-        // Writing to a string cannot fail.
-        let _ = writeln!(out, "v {x} {y} {z}");
-    }
-    for triangle in &given.triangles {
-        let [a, b, c] = triangle.map(|i| i + 1);
-        let _ = writeln!(out, "f {a} {b} {c}");
-    }
-    out
+    let stem = format!("{}-{}", plain(&stem), plain(mesh));
+    let name = naming::free(&stem, "obj", |name| names.contains(name));
+    names.insert(name.clone());
+    name
 }

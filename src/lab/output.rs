@@ -6,6 +6,8 @@ pub use insonify_base::output::*;
 pub mod dicom;
 pub mod movie;
 pub mod mp4;
+pub mod naming;
+pub mod obj;
 pub mod plot;
 pub mod uff;
 pub mod zea;

@@ -8,6 +8,7 @@ use egui::{RichText, Ui};
 
 use super::model::Model;
 use super::style::{self, button};
+use crate::output::naming;
 use crate::scene::{SceneError, shipped};
 use dialog::Dialog;
 pub(super) use dialog::show as dialog;
@@ -78,12 +79,7 @@ impl Files {
 /// A name like that of a scene which no file in the present folder has.
 fn free(scene: &Path) -> PathBuf {
     let stem = scene.file_stem().unwrap_or_default().to_string_lossy();
-    let names = (1..).map(|n| match n {
-        1 => PathBuf::from(format!("{stem}.toml")),
-        n => PathBuf::from(format!("{stem}-{n}.toml")),
-    });
-    let mut free = names.filter(|name| !name.exists());
-    free.next().expect("numbers do not end")
+    naming::free(&stem, "toml", |name| Path::new(name).exists()).into()
 }
 
 /// The text of an error: place, cause and remedy.

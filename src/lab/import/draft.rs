@@ -1,13 +1,12 @@
 //! The scene that an import makes: a text with comments, for a person to read and change.
 
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
 use super::pose::View;
 use crate::issue::FileError;
-use crate::output::files;
+use crate::output::{files, naming, obj};
 use crate::scene::check::SENSIBLE_SIZE;
 use crate::scene::mesh::Soup;
 use crate::scene::topology;
@@ -110,39 +109,32 @@ impl Draft {
             self.left_out.push(format!("{}: {size:.3} mm large", part.name));
             return Ok(None);
         }
-        let name = self.free(&part.name, |p| &p.name, |name, n| format!("{name} {n}"));
+        let name = self.free(&part.name);
         let plain: String = name
             .chars()
             .map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' })
             .take(80)
             .collect();
-        let file = self.free(
-            &format!("{MESHES}/{plain}.obj"),
-            |p| &p.file,
-            |_, n| format!("{MESHES}/{plain}-{n}.obj"),
-        );
+        let taken = |file: &str| self.parts.iter().any(|part| part.file == file);
+        let file = naming::free(&format!("{MESHES}/{plain}"), "obj", taken);
         let path = self.folder.join(&file);
-        files::replace(&path, obj(surface).as_bytes()).map_err(|e| unwritten(&path, &e))?;
+        let text = obj::text("mm, SPACE=LPS", &surface.positions, &surface.triangles);
+        files::replace(&path, text.as_bytes()).map_err(|e| unwritten(&path, &e))?;
         let volume = topology::volume(surface) / 1000.0;
         let triangles = surface.triangles.len();
         self.parts.push(Part { name: name.clone(), file, triangles, volume, ..part });
         Ok(Some(name))
     }
 
-    /// `wanted`, or what `next` makes of it and a number, so that no part has it.
-    fn free(
-        &self,
-        wanted: &str,
-        of: impl Fn(&Part) -> &String,
-        next: impl Fn(&str, usize) -> String,
-    ) -> String {
-        let taken = |name: &str| self.parts.iter().any(|p| of(p) == name);
+    /// `wanted`, or that with a number, so that no part has it.
+    fn free(&self, wanted: &str) -> String {
+        let taken = |name: &str| self.parts.iter().any(|part| part.name == name);
         let mut name = wanted.to_owned();
         for n in 2.. {
             if !taken(&name) {
                 break;
             }
-            name = next(wanted, n);
+            name = format!("{wanted} {n}");
         }
         name
     }
@@ -325,18 +317,4 @@ pub(super) fn quoted(text: &str) -> String {
 fn unwritten(path: &Path, error: &std::io::Error) -> FileError {
     let message = format!("cannot be written: {error}");
     FileError::file(path, message, "check the folder and the room in it")
-}
-
-/// A surface as text, from which every coordinate is read back to the last bit: what two surfaces share stays the same.
-fn obj(surface: &Soup) -> String {
-    let mut out = String::from("# mm, SPACE=LPS\n");
-    for [x, y, z] in &surface.positions {
-        // Writing to a string cannot fail.
-        let _ = writeln!(out, "v {x} {y} {z}");
-    }
-    for triangle in &surface.triangles {
-        let [a, b, c] = triangle.map(|i| i + 1);
-        let _ = writeln!(out, "f {a} {b} {c}");
-    }
-    out
 }
