@@ -5,8 +5,8 @@ use std::time::Instant;
 
 use super::files::message_of;
 use super::model::Model;
-use crate::igtl::{Order, Reach};
-use crate::scene::file::{facts, keys_below, put_settings, value_of_settings};
+use crate::igtl::{Order, Reach, command};
+use crate::scene::file::{facts, put_settings, value_of_settings};
 
 /// Carries out the order of a client; returns the answer. A scene to be opened becomes `wanted`.
 ///
@@ -26,16 +26,9 @@ pub(super) fn carry_out(
             let told = pairs.iter().map(|(path, value)| format!("{path} = {value}"));
             Ok(told.collect::<Vec<_>>().join("\n"))
         }
-        Order::Get(path) => match &keys_below(path)[..] {
-            [] => get(model, path),
-            keys => {
-                let set: Vec<String> = keys.iter().filter_map(|key| get(model, key).ok()).collect();
-                match set.is_empty() {
-                    true => Err(format!("`{path}` {NOT_TOLD}")),
-                    false => Ok(set.join("\n")),
-                }
-            }
-        },
+        Order::Get(path) => {
+            command::values(path, |key| get(model, key), || format!("`{path}` {NOT_TOLD}"))
+        }
         Order::Time(seconds) => {
             model.clock.seek(*seconds, now);
             model.touch(now);

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use insonify::gpu::Device;
-use insonify::igtl::{Order, Reach, Server};
+use insonify::igtl::{Order, Reach, Server, command};
 use insonify::scene::Scene;
 use insonify::scene::file::{self, SceneError, SceneFile};
 use insonify::sim::Simulator;
@@ -144,15 +144,8 @@ impl<'a> Session<'a> {
     }
 
     fn get(&self, path: &str) -> Result<String, String> {
-        let keys = file::keys_below(path);
-        match keys.is_empty() {
-            true => self.value(path),
-            false => {
-                let set: Vec<String> = keys.iter().filter_map(|key| self.value(key).ok()).collect();
-                let none = || format!("nothing of `{path}` is set in {}", self.path.display());
-                if set.is_empty() { Err(none()) } else { Ok(set.join("\n")) }
-            }
-        }
+        let none = || format!("nothing of `{path}` is set in {}", self.path.display());
+        command::values(path, |key| self.value(key), none)
     }
 
     /// The value of a key.

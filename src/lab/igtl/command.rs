@@ -7,6 +7,7 @@ use super::answer::respond;
 use super::client::{Answer, Client};
 use super::message::{Content, ExtendedHeader, Message};
 use super::wire::Label;
+use crate::scene::file::keys_below;
 use crate::settings::units::DURATION;
 
 /// Number of UTF-8 in the MIB of IANA.
@@ -86,6 +87,24 @@ impl Order {
             (false, false, key) => Self::of(&format!("{key} = {text}")),
         })
     }
+}
+
+/// The answer to `get`: the line that `value` gives of a key, or the lines of all keys of a table that have one; `none` says why
+/// there is none.
+///
+/// # Errors
+/// A key without a value, a table without any.
+pub fn values(
+    path: &str,
+    value: impl Fn(&str) -> Result<String, String>,
+    none: impl FnOnce() -> String,
+) -> Result<String, String> {
+    let keys = keys_below(path);
+    if keys.is_empty() {
+        return value(path);
+    }
+    let set: Vec<String> = keys.iter().filter_map(|key| value(key).ok()).collect();
+    if set.is_empty() { Err(none()) } else { Ok(set.join("\n")) }
 }
 
 impl Request {
