@@ -29,7 +29,6 @@ pub(super) struct Totals {
     /// Samples of each split.
     splits: Vec<u64>,
     anatomies: Vec<String>,
-    names: Vec<String>,
 }
 
 impl Totals {
@@ -39,7 +38,6 @@ impl Totals {
             pixels: 0,
             splits: vec![0; set.splits.len()],
             anatomies: Vec::new(),
-            names: set.splits.clone(),
         }
     }
 
@@ -51,8 +49,7 @@ impl Totals {
             *pixels += here;
             *samples += u64::from(here > 0);
         }
-        let place = self.names.iter().position(|name| *name == sample.split);
-        self.splits[place.unwrap_or(0)] += 1;
+        self.splits[sample.place] += 1;
         let anatomy = sample.facts["anatomy"].as_str().unwrap_or_default();
         if !self.anatomies.iter().any(|known| known == anatomy) {
             self.anatomies.push(anatomy.to_owned());
@@ -87,7 +84,7 @@ impl Totals {
             layout.word(),
             licence.name()
         );
-        for (split, count) in self.names.iter().zip(&self.splits) {
+        for (split, count) in set.splits.iter().zip(&self.splits) {
             let _ = writeln!(out, "- {split}: {count} samples");
         }
         let _ = writeln!(out, "- anatomies: {}\n", self.anatomies.join(", "));

@@ -13,8 +13,7 @@ pub(super) fn write(
 ) -> Result<(), DatasetError> {
     let mut splits: Vec<(Vec<Value>, Vec<Value>)> = vec![Default::default(); set.splits.len()];
     set.each(&mut |sample| {
-        let place = set.splits.iter().position(|split| *split == sample.split);
-        let (images, annotations) = &mut splits[place.unwrap_or(0)];
+        let (images, annotations) = &mut splits[sample.place];
         let (width, height) = sample.classes.dimensions();
         let file = placed(&sample, "png");
         out.write(&file, &sample.image)?;

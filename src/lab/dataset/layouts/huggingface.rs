@@ -13,7 +13,6 @@ pub(super) fn write(
 ) -> Result<(), DatasetError> {
     let mut lines: Vec<String> = vec![String::new(); set.splits.len()];
     set.each(&mut |sample| {
-        let place = set.splits.iter().position(|split| *split == sample.split);
         let (width, height) = sample.classes.dimensions();
         let [image, segmentation] = ["png", "seg.png"].map(|end| placed(&sample, end));
         out.write(&image, &sample.image)?;
@@ -34,7 +33,7 @@ pub(super) fn write(
             "classes": facts["classes"].as_object().map(|all| all.keys().cloned().collect::<Vec<_>>()),
             "drawn": facts["drawn"],
         });
-        lines[place.unwrap_or(0)] += &format!("{line}\n");
+        lines[sample.place] += &format!("{line}\n");
         counted(&sample);
         Ok(())
     })?;

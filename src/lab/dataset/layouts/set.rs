@@ -33,6 +33,8 @@ pub(super) struct Labelled {
     /// Its number as text, as its files are named.
     pub(super) name: String,
     pub(super) split: String,
+    /// The place of its split among those of the set.
+    pub(super) place: usize,
     /// The content of its `.json`.
     pub(super) facts: Value,
     /// The image, PNG.
@@ -110,7 +112,7 @@ impl Set {
                 let path = path.with_extension(end);
                 fs::read(&path).map_err(|e| DatasetError::reading(&path, e))
             };
-            act(labelled(&path, &file("json")?, file("png")?, &file("seg.png")?)?)?;
+            act(self.labelled(&path, &file("json")?, file("png")?, &file("seg.png")?)?)?;
         }
         Ok(())
     }
@@ -141,7 +143,7 @@ impl Set {
                     Some("json") => {
                         entry.read_to_end(&mut bytes).map_err(failed)?;
                         let taken = std::mem::take(&mut image);
-                        act(labelled(&path.join(member), &bytes, taken, &classes)?)?;
+                        act(self.labelled(&path.join(member), &bytes, taken, &classes)?)?;
                         classes.clear();
                     }
                     _ => {}
@@ -149,6 +151,27 @@ impl Set {
             }
         }
         Ok(())
+    }
+
+    /// A sample of the contents of its files.
+    fn labelled(
+        &self,
+        path: &Path,
+        facts: &[u8],
+        image: Vec<u8>,
+        classes: &[u8],
+    ) -> Result<Labelled, DatasetError> {
+        let spoilt = || {
+            let remedy = "remove the sample's files, and go on with --resume";
+            fault(path, "is no sample any more", remedy)
+        };
+        let facts: Value = serde_json::from_slice(facts).map_err(|_| spoilt())?;
+        let classes = picture(classes).map_err(|_| spoilt())?;
+        let number = facts["sample"].as_u64().ok_or_else(spoilt)?;
+        let split = facts["split"].as_str().ok_or_else(spoilt)?.to_owned();
+        let place = self.splits.iter().position(|known| *known == split).ok_or_else(spoilt)?;
+        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        Ok(Labelled { number, name, split, place, facts, image, classes })
     }
 }
 
@@ -159,22 +182,4 @@ fn sorted(folder: &Path, end: &str) -> Vec<PathBuf> {
     let mut all: Vec<PathBuf> = entries.map(|entry| entry.path()).filter(ends).collect();
     all.sort();
     all
-}
-
-fn labelled(
-    path: &Path,
-    facts: &[u8],
-    image: Vec<u8>,
-    classes: &[u8],
-) -> Result<Labelled, DatasetError> {
-    let spoilt = || {
-        let remedy = "remove the sample's files, and go on with --resume";
-        fault(path, "is no sample any more", remedy)
-    };
-    let facts: Value = serde_json::from_slice(facts).map_err(|_| spoilt())?;
-    let classes = picture(classes).map_err(|_| spoilt())?;
-    let number = facts["sample"].as_u64().ok_or_else(spoilt)?;
-    let split = facts["split"].as_str().ok_or_else(spoilt)?.to_owned();
-    let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    Ok(Labelled { number, name, split, facts, image, classes })
 }
