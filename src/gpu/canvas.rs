@@ -1,5 +1,5 @@
-//! What a picture of the window consists of: images of the device, scaled to their places on black, and an egui interface over
-//! them; and such pictures beside the window, as large as wanted.
+//! Pictures of the window: images of the device, scaled to their places on black, and an egui interface over them. Beside the
+//! window such pictures are as large as wanted.
 //!
 //! Images are blitted, so that their grey levels reach the screen unchanged; egui's own renderer would
 //! convert them to its colour space.

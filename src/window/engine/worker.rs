@@ -86,7 +86,7 @@ pub(super) struct Worker {
 }
 
 /// Hands news to the window.
-fn told(shared: &Shared, wake: &Wake, news: News) {
+fn hand_over(shared: &Shared, wake: &Wake, news: News) {
     shared.state.lock().news.push(news);
     wake();
 }
@@ -272,7 +272,7 @@ impl Worker {
         if matches!(news, News::Frame(..)) && self.device.shares_queue() {
             self.shared.state.lock().undrawn.get_or_insert_with(Instant::now);
         }
-        told(&self.shared, &self.wake, news);
+        hand_over(&self.shared, &self.wake, news);
     }
 
     /// The newest order once there is one, or the last one again while its image changes by itself; at rest

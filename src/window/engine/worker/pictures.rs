@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
-use super::{Imaged, Taken, Worker, told};
+use super::{Imaged, Taken, Worker, hand_over};
 use crate::engine::News;
 use crate::gpu::Abandon;
 use crate::look::Pictured;
@@ -157,7 +157,7 @@ impl Worker {
             painted: painted.as_ref().map(|(image, opacity)| (image, *opacity)),
         };
         if self.left.is_some() && simulator.compiles(scene) {
-            told(&self.shared, &self.wake, News::Preparing(COMPILING));
+            hand_over(&self.shared, &self.wake, News::Preparing(COMPILING));
         }
         simulator.frames_into(scene, &[Shot::of(scene, index)], &outputs)?;
         let timings = simulator.wait()?.pop().unwrap_or_default();
