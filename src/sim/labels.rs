@@ -4,8 +4,6 @@
 use serde_json::{Value, json};
 
 use super::layout::{Frame, Label, NONE};
-use super::stages::{chart, label};
-use super::{SimError, Simulator};
 use crate::scene::{Scene, palette};
 
 /// The labels of a frame, asked for by `simulation.labels`.
@@ -196,29 +194,6 @@ impl LabelGrid {
             }
         };
         LabelArray { kind, shape, values }
-    }
-}
-
-impl Simulator {
-    /// The labels of the last frame; none if `simulation.labels` was off.
-    ///
-    /// # Errors
-    /// A Vulkan error.
-    pub fn labels(&mut self) -> Result<Option<Labels>, SimError> {
-        if !self.last.labelled {
-            return Ok(None);
-        }
-        let frame = *self.constants();
-        let levelled = self.last.levelled;
-        let mut grid = |array, rows: u32, columns: u32| {
-            let labels = bytemuck::pod_collect_to_vec(&self.read_again(array)?);
-            let shape = [rows, columns].map(|n| n as usize);
-            Ok::<_, SimError>(LabelGrid { shape, labels, levelled })
-        };
-        Ok(Some(Labels {
-            samples: grid(&label::LABELS, frame.scanlines, frame.samples)?,
-            pixels: grid(&chart::PIXEL_LABELS, frame.image_height, frame.image_width)?,
-        }))
     }
 }
 

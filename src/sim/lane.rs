@@ -12,6 +12,7 @@ use super::contact::SkinContact;
 use super::fusion::{FusionResources, Pyramid};
 use super::layout::{self, Frame};
 use super::pass::{Array, Sizes};
+use super::placement;
 use super::read_out::ReadOut;
 use super::stages::display::PIXELS;
 use super::stages::fuse::FUSED;
@@ -19,17 +20,8 @@ use super::stages::inputs::{FRAME, TISSUES};
 use super::stages::mask::PRESCAN;
 use super::stages::shadow::SHADED;
 use super::tables::{Tables, tissue_seed};
-use super::{SimError, Simulator, machine, placement};
 use crate::gpu::{Buffer, Commands, Device, GpuError};
 use crate::scene::Scene;
-use crate::settings::Machine;
-
-/// Part of a GPU's memory that lanes may take together.
-const SHARE_OF_MEMORY: u64 = 8;
-/// The same of a software driver, which one image keeps busy.
-const SHARE_OF_HOST: u64 = 64;
-/// Most images of a frame; more would gain nothing and wait longer for the first of them.
-const MOST: u64 = 64;
 
 /// What images of the same scene at the same time may differ in.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -144,48 +136,4 @@ impl Lane {
 /// The array of the finished image.
 pub(super) fn pixels(fused: bool) -> &'static Array {
     if fused { &FUSED } else { &PIXELS }
-}
-
-impl Simulator {
-    /// Number of images that [`Self::frames`] makes of the scene at once, at most: as many as there is memory for.
-    pub fn most_shots(&self) -> usize {
-        let each = self.passes.lanes[0].buffers.own_bytes().max(1);
-        let share = match machine(&self.device) {
-            Machine::Gpu => SHARE_OF_MEMORY,
-            Machine::Software => SHARE_OF_HOST,
-        };
-        let most = self.device.info().memory_bytes / share / each;
-        most.clamp(1, MOST) as usize
-    }
-
-    /// Chooses the image of the last frame of which results are read from now on, by its place in the shots of
-    /// [`Self::frames`]; the next frame chooses its first again.
-    ///
-    /// # Panics
-    /// If the last frame had no such image.
-    pub fn choose(&mut self, shot: usize) {
-        assert!(shot < self.passes.active, "image {shot} of {}", self.passes.active);
-        self.last.chosen = shot;
-    }
-
-    /// The lane whose results are read.
-    pub(super) fn lane(&self) -> &Lane {
-        &self.passes.lanes[self.last.chosen]
-    }
-
-    /// The content of an array of the chosen lane after the last frame. It is copied within the next frame if it
-    /// was read after this one, so that reading it then takes no submission of its own.
-    pub(super) fn read_again(&mut self, array: &'static Array) -> Result<Vec<u8>, SimError> {
-        let sizes = self.sizes();
-        let lane = &mut self.passes.lanes[self.last.chosen];
-        let mut bytes = vec![0; lane.buffers.bytes(array, &sizes)];
-        match lane.read_out.take(array) {
-            Some(copy) => self.submissions.read(copy, &mut bytes)?,
-            None => {
-                self.submissions.wait()?;
-                self.device.read_into(&lane.buffers[array], 0, &mut bytes)?;
-            }
-        }
-        Ok(bytes)
-    }
 }

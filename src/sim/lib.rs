@@ -27,6 +27,7 @@ pub mod calibration;
 pub mod contact;
 pub mod dump;
 mod echoes;
+mod error;
 mod expected;
 pub mod facts;
 pub mod fields;
@@ -73,6 +74,7 @@ use crate::scene::Scene;
 use crate::settings::Machine;
 use batches::FrameBudget;
 use bvh::Splits;
+pub use error::SimError;
 use lane::Lane;
 pub use lane::Shot;
 use line::OneLine;
@@ -90,17 +92,6 @@ pub use tracer::Tracer;
 use upload::frame_constants;
 use view3d::Viewer3d;
 use world::World;
-
-/// Why a scene cannot be simulated.
-#[derive(Debug, thiserror::Error)]
-pub enum SimError {
-    /// The Vulkan layer failed.
-    #[error(transparent)]
-    Gpu(#[from] GpuError),
-    /// The geometry does not fit the tracer.
-    #[error(transparent)]
-    World(#[from] world::WorldError),
-}
 
 /// The kind of machine that a device is: a software driver on the processor, or a GPU.
 pub fn machine(device: &Device) -> Machine {

@@ -2,12 +2,43 @@
 
 use super::contact::SkinContact;
 use super::fusion::FusionResources;
+use super::labels::{LabelGrid, Labels};
+use super::lane::{self, Lane};
 use super::pass::{Array, Sizes};
-use super::stages::{axial, beam, inputs, scatter, trace};
-use super::{Memory, SimError, Simulator, lane, layout, rf};
+use super::stages::{axial, beam, chart, inputs, label, paint, scatter, tint, trace};
+use super::{Memory, SimError, Simulator, layout, machine, rf};
 use crate::probe::Probe;
+use crate::settings::Machine;
+
+/// Part of a GPU's memory that lanes may take together.
+const SHARE_OF_MEMORY: u64 = 8;
+/// The same of a software driver, which one image keeps busy.
+const SHARE_OF_HOST: u64 = 64;
+/// Most images of a frame; more would gain nothing and wait longer for the first of them.
+const MOST: u64 = 64;
 
 impl Simulator {
+    /// Number of images that [`Self::frames`] makes of the scene at once, at most: as many as there is memory for.
+    pub fn most_shots(&self) -> usize {
+        let each = self.passes.lanes[0].buffers.own_bytes().max(1);
+        let share = match machine(&self.device) {
+            Machine::Gpu => SHARE_OF_MEMORY,
+            Machine::Software => SHARE_OF_HOST,
+        };
+        let most = self.device.info().memory_bytes / share / each;
+        most.clamp(1, MOST) as usize
+    }
+
+    /// Chooses the image of the last frame of which results are read from now on, by its place in the shots of
+    /// [`Self::frames`]; the next frame chooses its first again.
+    ///
+    /// # Panics
+    /// If the last frame had no such image.
+    pub fn choose(&mut self, shot: usize) {
+        assert!(shot < self.passes.active, "image {shot} of {}", self.passes.active);
+        self.last.chosen = shot;
+    }
+
     /// The contact of the probe with the skin in the chosen image of the last frame; none where the scene asks for no contact.
     pub fn contact(&self) -> Option<SkinContact> {
         self.lane().touch
@@ -30,6 +61,45 @@ impl Simulator {
     pub fn pixels(&mut self) -> Result<(u32, u32, Vec<u8>), SimError> {
         let (width, height) = (self.constants().image_width, self.constants().image_height);
         Ok((width, height, self.read_again(lane::pixels(self.last.fused))?))
+    }
+
+    /// The last frame with its acquired pixels coloured, RGBA bytes row by row; none if this was not
+    /// asked for or the frame showed no acquired volume.
+    ///
+    /// # Errors
+    /// A Vulkan error.
+    pub fn tinted_pixels(&mut self) -> Result<Option<Vec<u8>>, SimError> {
+        self.last.tinted.then(|| self.read(&tint::TINTED)).transpose()
+    }
+
+    /// The last frame with its tissues in colours, RGBA bytes row by row; none if this was not asked for or the frame
+    /// had no labels.
+    ///
+    /// # Errors
+    /// A Vulkan error.
+    pub fn painted_pixels(&mut self) -> Result<Option<Vec<u8>>, SimError> {
+        self.last.painted.then(|| self.read(&paint::PAINTED)).transpose()
+    }
+
+    /// The labels of the last frame; none if `simulation.labels` was off.
+    ///
+    /// # Errors
+    /// A Vulkan error.
+    pub fn labels(&mut self) -> Result<Option<Labels>, SimError> {
+        if !self.last.labelled {
+            return Ok(None);
+        }
+        let frame = *self.constants();
+        let levelled = self.last.levelled;
+        let mut grid = |array, rows: u32, columns: u32| {
+            let labels = bytemuck::pod_collect_to_vec(&self.read_again(array)?);
+            let shape = [rows, columns].map(|n| n as usize);
+            Ok::<_, SimError>(LabelGrid { shape, labels, levelled })
+        };
+        Ok(Some(Labels {
+            samples: grid(&label::LABELS, frame.scanlines, frame.samples)?,
+            pixels: grid(&chart::PIXEL_LABELS, frame.image_height, frame.image_width)?,
+        }))
     }
 
     /// A warning for the user about how the scene was uploaded, if there is one.
@@ -123,6 +193,27 @@ impl Simulator {
         let (lines, samples) = (scanlines as usize, samples as usize);
         let lateral = self.lateral()?;
         Ok((factor, rf::lines(probe, axial_sigma, lines, samples, &lateral, factor)))
+    }
+
+    /// The lane whose results are read.
+    pub(super) fn lane(&self) -> &Lane {
+        &self.passes.lanes[self.last.chosen]
+    }
+
+    /// The content of an array of the chosen lane after the last frame. It is copied within the next frame if it
+    /// was read after this one, so that reading it then takes no submission of its own.
+    pub(super) fn read_again(&mut self, array: &'static Array) -> Result<Vec<u8>, SimError> {
+        let sizes = self.sizes();
+        let lane = &mut self.passes.lanes[self.last.chosen];
+        let mut bytes = vec![0; lane.buffers.bytes(array, &sizes)];
+        match lane.read_out.take(array) {
+            Some(copy) => self.submissions.read(copy, &mut bytes)?,
+            None => {
+                self.submissions.wait()?;
+                self.device.read_into(&lane.buffers[array], 0, &mut bytes)?;
+            }
+        }
+        Ok(bytes)
     }
 
     pub(super) fn floats(&mut self, array: &'static Array) -> Result<Vec<f32>, SimError> {

@@ -4,7 +4,6 @@ use super::super::labels::colours;
 use super::super::pass::{Array, Pass, Sizes, per_pixel};
 use super::super::passes::Passes;
 use super::super::push;
-use super::super::{SimError, Simulator};
 use super::chart::PIXEL_LABELS;
 use super::display::PIXELS;
 use super::inputs::FRAME;
@@ -54,16 +53,5 @@ impl Passes {
             vec![(&PIXELS, lane.pixels(fused))]
         })?;
         Ok(&self.lanes[0].buffers[&PAINTED])
-    }
-}
-
-impl Simulator {
-    /// The last frame with its tissues in colours, RGBA bytes row by row; none if this was not asked for or the frame
-    /// had no labels.
-    ///
-    /// # Errors
-    /// A Vulkan error.
-    pub fn painted_pixels(&mut self) -> Result<Option<Vec<u8>>, SimError> {
-        self.last.painted.then(|| self.read(&PAINTED)).transpose()
     }
 }

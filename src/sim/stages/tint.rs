@@ -3,7 +3,6 @@
 use super::super::pass::{Array, Pass, Sizes, per_pixel};
 use super::super::passes::Passes;
 use super::super::push;
-use super::super::{SimError, Simulator};
 use super::blur::SUMS;
 use super::convert::MASK_IMAGE;
 use super::fuse::FUSED;
@@ -56,16 +55,5 @@ impl Passes {
             Vec::new()
         })?;
         Ok(&self.lanes[0].buffers[&TINTED])
-    }
-}
-
-impl Simulator {
-    /// The last frame with its acquired pixels coloured, RGBA bytes row by row; none if this was not
-    /// asked for or the frame showed no acquired volume.
-    ///
-    /// # Errors
-    /// A Vulkan error.
-    pub fn tinted_pixels(&mut self) -> Result<Option<Vec<u8>>, SimError> {
-        self.last.tinted.then(|| self.read(&TINTED)).transpose()
     }
 }
