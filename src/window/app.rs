@@ -12,8 +12,8 @@ use winit::window::WindowId;
 use super::deaths::Deaths;
 use super::link::Link;
 use super::open::{Open, Plan};
-use super::session::{Wake, waker};
 use super::statistics::Times;
+use super::wake::{Woken, waker};
 use super::{Options, ViewError};
 use crate::gpu::{GpuError, Screenshot, ValidationLog};
 use crate::output::{self, files};
@@ -35,7 +35,7 @@ pub(super) struct App {
 }
 
 impl App {
-    pub(super) fn new(scene: Scene, options: Options, proxy: EventLoopProxy<Wake>) -> Self {
+    pub(super) fn new(scene: Scene, options: Options, proxy: EventLoopProxy<Woken>) -> Self {
         let deaths = Deaths::default();
         deaths.watch(waker(proxy.clone()));
         let plan = Plan { scene, options, proxy, link: Link::default(), deaths };
@@ -157,7 +157,7 @@ fn unwritten(file: &Path, error: &dyn std::error::Error) -> ViewError {
     ViewError::Unwritten { file: file.to_owned(), reason: error.to_string() }
 }
 
-impl ApplicationHandler<Wake> for App {
+impl ApplicationHandler<Woken> for App {
     fn resumed(&mut self, events: &ActiveEventLoop) {
         if self.open.is_none() {
             let opened = Open::new(events, &mut self.plan);
@@ -165,7 +165,7 @@ impl ApplicationHandler<Wake> for App {
         }
     }
 
-    fn user_event(&mut self, events: &ActiveEventLoop, _: Wake) {
+    fn user_event(&mut self, events: &ActiveEventLoop, _: Woken) {
         let plan = &mut self.plan;
         let failed = self.open.as_mut().map(|open| open.listen(plan));
         if let Some(Err(error)) = failed {

@@ -4,8 +4,8 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use egui::{
-    Align2, Area, Color32, Event, FontId, Grid, Id, Key, Painter, PointerButton, Pos2, Rect,
-    RichText, Sense, Shape, Stroke, TextEdit, TextWrapMode, Ui, vec2,
+    Align2, Area, Color32, Event, FontId, Grid, Id, Key, Modifiers, Painter, PointerButton, Pos2,
+    Rect, RichText, Sense, Shape, Stroke, TextEdit, TextWrapMode, Ui, vec2,
 };
 use glam::DVec2;
 
@@ -13,7 +13,7 @@ use super::model::calipers::{Caliper, Kind, Reading};
 use super::model::sheet::{Mark, Sheet, Tool, What};
 use super::picture::Frame;
 use super::place::Place;
-use super::{keys, notes, style};
+use super::{notes, style};
 use crate::settings::Exam;
 use insonify_lab::exam;
 
@@ -27,6 +27,22 @@ const COLOURS: [Color32; 5] = [
     Color32::from_rgb(255, 150, 190),
     Color32::from_rgb(200, 170, 255),
 ];
+
+/// The keys that take tools, each for its tool.
+pub(super) const KEYS: [(Key, Tool); 5] = [
+    (Key::L, Tool::Measure(Kind::Distance)),
+    (Key::O, Tool::Measure(Kind::Ellipse)),
+    (Key::K, Tool::Measure(Kind::Angle)),
+    (Key::J, Tool::Measure(Kind::Trace)),
+    (Key::N, Tool::Note),
+];
+
+/// The tool that a key takes. The code that follows the pointer asks for it: a click before the key belongs to the tool
+/// before, though both may arrive at once.
+fn tool(key: Key, modifiers: Modifiers) -> Option<Tool> {
+    let of = KEYS.into_iter().find(|(of, _)| *of == key && !modifiers.command);
+    of.map(|(_, tool)| tool)
+}
 
 /// Handles the pointer's events over the picture, and draws all marks.
 /// `exam` has the texts that are offered; `listens`: keys may take tools; `bare`: only what belongs to a saved picture is drawn.
@@ -118,7 +134,7 @@ fn pointer(
     for event in events {
         match event {
             Event::Key { key, pressed: true, modifiers, .. } if listens => {
-                if let Some(tool) = keys::tool(key, modifiers) {
+                if let Some(tool) = tool(key, modifiers) {
                     sheet.toggle(tool);
                 }
             }

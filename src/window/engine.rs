@@ -15,6 +15,7 @@ use super::look::{Look, Pictured};
 use super::model::mmode::{Aim, Column};
 use super::model::{Order, Settings};
 use super::picture::{Film, Frame};
+use super::wake::Wake;
 use crate::gpu::Device;
 use crate::probe::Probe;
 use crate::scene::Scene;
@@ -63,9 +64,6 @@ pub enum News {
     /// Nothing more will come: the thread died by a bug.
     Died,
 }
-
-/// Tells the window that there is news.
-type Wake = Arc<dyn Fn() + Send + Sync>;
 
 /// An image of the loop that is looked at: made again at the scene's own quality.
 #[derive(Clone, PartialEq)]

@@ -6,10 +6,11 @@ use std::path::{Path, PathBuf};
 
 use egui::{RichText, Ui};
 
+use super::error::message_of;
 use super::model::Model;
 use super::style::{self, button};
 use crate::output::naming;
-use crate::scene::{SceneError, shipped};
+use crate::scene::shipped;
 use dialog::Dialog;
 pub(super) use dialog::show as dialog;
 
@@ -80,12 +81,6 @@ impl Files {
 fn free(scene: &Path) -> PathBuf {
     let stem = scene.file_stem().unwrap_or_default().to_string_lossy();
     naming::free(&stem, "toml", |name| Path::new(name).exists()).into()
-}
-
-/// The text of an error: place, cause and remedy.
-pub(super) fn message_of(error: &SceneError) -> String {
-    let remedy = error.remedy.as_deref().map(|r| format!("\n{r}"));
-    format!("{error}{}", remedy.unwrap_or_default())
 }
 
 /// Draws buttons and the name of the file, for the console.

@@ -8,13 +8,20 @@ use egui::{
 
 use super::panel::{Ask, Desk, Dock, Panel, Row};
 use super::way::Way;
-use super::{FIRST_STEPS, recent, style};
+use super::{recent, style};
 use crate::scene::shipped::{self, SCENES, Shipped};
 
 /// Room for one picture, points.
 const PICTURE: egui::Vec2 = vec2(190.0, 130.0);
 /// Pictures in a row.
 const COLUMNS: usize = 3;
+
+/// What to do first, in three lines.
+pub const FIRST_STEPS: [&str; 3] = [
+    "Drag the probe on the skin in the 3D view, or slide it by the arrow keys; Shift leans it, Ctrl and the wheel turn it.",
+    "Space freezes the image, L measures a distance in it, F2 saves it with its settings.",
+    "The console has gain, depth and all other settings; ? lists the keys.",
+];
 
 /// Its row in the list of panels.
 pub(super) const ROW: Row = Row {

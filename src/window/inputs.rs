@@ -4,11 +4,12 @@ use std::net::{IpAddr, SocketAddr};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use super::files::message_of;
-use super::link::{Bell, Link, Report};
+use super::error::{ViewError, message_of};
+use super::link::{Link, Report};
 use super::model::{Model, StoredTrajectory, TrajectoryState, age};
+use super::options::Listen;
 use super::pads::{Pads, Word};
-use super::{Listen, ViewError};
+use super::wake::Bell;
 use crate::igtl::{PORT, Request, TrackerState};
 use crate::output::files;
 use crate::scene::Tracker;

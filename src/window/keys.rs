@@ -2,8 +2,8 @@
 
 use egui::{Key, Modifiers};
 
+use super::calipers::KEYS;
 use super::model::Axis;
-use super::model::calipers::Kind;
 use super::model::sheet::Tool;
 use super::panels;
 
@@ -48,6 +48,17 @@ const fn moves(back: Key, forth: Key, axis: Axis) -> [Binding; 2] {
     [(back, false, Action::Move(axis, -1.0)), (forth, false, Action::Move(axis, 1.0))]
 }
 
+/// The keys that take tools.
+const fn tools() -> [Binding; KEYS.len()] {
+    let mut bindings = [(Key::L, false, Action::Close); KEYS.len()];
+    let mut at = 0;
+    while at < KEYS.len() {
+        bindings[at] = (KEYS[at].0, false, Action::Take(KEYS[at].1));
+        at += 1;
+    }
+    bindings
+}
+
 /// The place of the list of keys among the panels.
 const HELP: usize = {
     let mut at = 0;
@@ -88,17 +99,7 @@ const BINDINGS: &[(&str, &[Binding], &str)] = &[
         "frozen: one image back and on",
     ),
     ("Enter", &[(Key::Enter, false, Action::Loop)], "frozen: play and stop the loop"),
-    (
-        "L O K J N",
-        &[
-            (Key::L, false, Action::Take(Tool::Measure(Kind::Distance))),
-            (Key::O, false, Action::Take(Tool::Measure(Kind::Ellipse))),
-            (Key::K, false, Action::Take(Tool::Measure(Kind::Angle))),
-            (Key::J, false, Action::Take(Tool::Measure(Kind::Trace))),
-            (Key::N, false, Action::Take(Tool::Note)),
-        ],
-        "measure a distance, an ellipse, an angle, an outline; place a text",
-    ),
+    ("L O K J N", &tools(), "measure a distance, an ellipse, an angle, an outline; place a text"),
     (
         "Del",
         &[(Key::Delete, false, Action::Delete), (Key::Backspace, false, Action::Delete)],
@@ -171,15 +172,6 @@ pub(super) fn list() -> impl Iterator<Item = (String, String)> {
         (keys.join(" "), format!("open and close: {} (Esc closes this list)", names.join(", ")));
     let own = BINDINGS.iter().filter(|(keys, ..)| !keys.is_empty());
     own.map(|(keys, _, text)| ((*keys).to_owned(), (*text).to_owned())).chain([panels])
-}
-
-/// The tool that a key takes. The code that follows the pointer calls it: a click before the key belongs to the
-/// tool before, though both may arrive at once.
-pub(super) fn tool(key: Key, modifiers: Modifiers) -> Option<Tool> {
-    match action(key, modifiers) {
-        Some(Action::Take(tool)) => Some(tool),
-        _ => None,
-    }
 }
 
 /// What a key does.

@@ -23,6 +23,7 @@ mod deaths;
 mod dual;
 mod ecg;
 pub mod engine;
+mod error;
 mod exam;
 mod files;
 mod framing;
@@ -47,6 +48,7 @@ mod notice;
 mod offer;
 mod open;
 mod opening;
+mod options;
 mod orders;
 mod pads;
 mod panel;
@@ -67,129 +69,18 @@ mod timing;
 mod tools;
 mod unsaved;
 mod view3d;
+mod wake;
 mod watch;
 mod way;
 
-use std::net::IpAddr;
-use std::path::PathBuf;
-use std::sync::Arc;
-
 use winit::event_loop::EventLoop;
 
+pub use error::{Refusal, ViewError};
+pub use gallery::FIRST_STEPS;
 pub use model::Model;
+pub use options::{Listen, Options, Prepare};
 
-use crate::gpu::{Device, DeviceOptions, GpuError};
-use crate::igtl::IgtlError;
 use crate::scene::Scene;
-use crate::scene::animation::Track;
-use crate::sim::shaders::Library;
-use crate::sim::{SimError, Tracer};
-
-/// Options of the window.
-pub struct Options {
-    /// The scene file.
-    pub file: PathBuf,
-    /// What is suspicious about the scene, as loading it has told.
-    pub warnings: Vec<String>,
-    /// Settings of the command line, which replace those of the file.
-    pub overrides: Vec<(String, String)>,
-    /// The device to take; [`run`] adds that it must serve a window.
-    pub device: DeviceOptions,
-    /// The kernels.
-    pub library: Arc<Library>,
-    /// Time of the scene at the start, s.
-    pub seconds: f64,
-    /// Scale of the interface; 1 is the display's own.
-    pub scale: f32,
-    /// Writes the window's picture into this file (PNG) once it shows an image, and ends.
-    pub screenshot: Option<PathBuf>,
-    /// Writes the timings into this file at the end.
-    pub json: Option<PathBuf>,
-    /// A trajectory that the probe follows from the start, and its file.
-    pub trajectory: Option<(Track, PathBuf)>,
-    /// Address at which OpenIGTLink clients are awaited from the start; none without it.
-    pub listen: Option<Listen>,
-    /// Folder of stills and clips.
-    pub captures: PathBuf,
-    /// Begins with pictures of the scenes that ship.
-    pub gallery: bool,
-    /// Fits path and scatterer counts to the device, and chooses a tracer that it has.
-    pub prepare: Prepare,
-}
-
-/// The address at which OpenIGTLink clients are awaited.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Listen {
-    /// Address of this machine.
-    pub address: IpAddr,
-    /// Port; 0 takes any that is free.
-    pub port: u16,
-}
-
-/// The type of [`Options::prepare`].
-pub type Prepare = Box<dyn Fn(&Arc<Device>, &mut Scene) -> Result<Tracer, Refusal>>;
-
-/// What to do first, in three lines.
-pub const FIRST_STEPS: [&str; 3] = [
-    "Drag the probe on the skin in the 3D view, or slide it by the arrow keys; Shift leans it, Ctrl and the wheel turn it.",
-    "Space freezes the image, L measures a distance in it, F2 saves it with its settings.",
-    "The console has gain, depth and all other settings; ? lists the keys.",
-];
-
-/// The reason why a device does not suit.
-pub type Refusal = Box<dyn std::error::Error + Send + Sync>;
-
-/// The reason why there is no window, or no more.
-#[derive(Debug, thiserror::Error)]
-pub enum ViewError {
-    /// There is no display, or it cannot be reached.
-    #[error("no window can be opened: {0}; `insonify render` needs no display")]
-    Display(String),
-    /// An error of the device.
-    #[error(transparent)]
-    Gpu(#[from] GpuError),
-    /// The device does not suit.
-    #[error("{0}")]
-    Refused(Refusal),
-    /// An error of the simulation before its first image.
-    #[error(transparent)]
-    Sim(#[from] SimError),
-    /// The OpenIGTLink server cannot listen.
-    #[error("{error}: {}", error.remedy())]
-    Igtl {
-        /// The cause.
-        #[from]
-        error: IgtlError,
-    },
-    /// The system has no room for another thread.
-    #[error("no thread can be started: {0}; close other programs, or raise the limit on threads")]
-    Thread(std::io::Error),
-    /// The simulation's thread died by a bug; the window lives on.
-    #[error("the simulation died by a bug")]
-    Died,
-    /// The device was lost a second time in a short while.
-    #[error(
-        "{0}; it had been lost a moment before, so it was not opened again: lower the quality \
-         (--quality draft), choose another --device, or install a newer driver"
-    )]
-    LostAgain(Box<ViewError>),
-    /// A file that was asked for cannot be written.
-    #[error("writing {}: {reason}", file.display())]
-    Unwritten {
-        /// The file.
-        file: PathBuf,
-        /// The system's message.
-        reason: String,
-    },
-    /// The validation layers were asked for and have found something.
-    #[error("{count} validation messages, the first: {first}")]
-    Validation {
-        /// Number of messages.
-        count: usize,
-        /// The first message.
-        first: String,
-    },
-}
 
 /// Opens a window on `scene` and stays until it is closed.
 ///

@@ -3,44 +3,15 @@
 
 use std::net::{IpAddr, SocketAddr};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use glam::DAffine3;
 use parking_lot::Mutex;
-use winit::event_loop::EventLoopProxy;
 
-use super::session::Wake;
+use super::wake::Bell;
 use crate::gpu::{GpuError, Image};
 use crate::igtl::{IgtlError, Picture, Request, Server, ServerSettings, Status, TrackerState};
 use crate::scene::Tracker;
 use crate::sim::layout;
-
-/// Wakes the event loop once for everything that has come since it looked last: however much arrives,
-/// no more than one wake waits.
-#[derive(Clone)]
-pub(super) struct Bell {
-    rung: Arc<AtomicBool>,
-    proxy: EventLoopProxy<Wake>,
-}
-
-impl Bell {
-    pub(super) fn new(proxy: EventLoopProxy<Wake>) -> Self {
-        Self { rung: Arc::default(), proxy }
-    }
-
-    /// Called by any thread after it has put something into a place that the event loop looks at.
-    pub(super) fn ring(&self) {
-        if !self.rung.swap(true, Ordering::AcqRel) {
-            // An event loop that is gone needs no news.
-            let _ = self.proxy.send_event(Wake);
-        }
-    }
-
-    /// Called by the event loop before it looks.
-    pub(super) fn answer(&self) {
-        self.rung.store(false, Ordering::Release);
-    }
-}
 
 /// State of the server.
 #[derive(Clone, Debug, PartialEq)]

@@ -15,9 +15,10 @@ use super::link::Link;
 use super::look::{Look, Pictured};
 use super::opening::{Opened, Opening};
 use super::picture::Frame;
-use super::session::{self, Session, Wake};
+use super::session::Session;
 use super::state::State;
 use super::tools::Tools;
+use super::wake::{Woken, waker};
 use super::watch::Watch;
 use super::way::Way;
 use super::{Model, Options, ViewError, acts, orders};
@@ -81,7 +82,7 @@ pub(super) struct Open {
 pub(super) struct Plan {
     pub(super) scene: Scene,
     pub(super) options: Options,
-    pub(super) proxy: EventLoopProxy<Wake>,
+    pub(super) proxy: EventLoopProxy<Woken>,
     /// The OpenIGTLink server stays whatever becomes of the device.
     pub(super) link: Link,
     pub(super) deaths: Deaths,
@@ -90,7 +91,7 @@ pub(super) struct Plan {
 impl Plan {
     fn tools(&self, device: &Device) -> Tools {
         let (folder, proxy) = (self.options.captures.clone(), self.proxy.clone());
-        Tools::new(device.info(), folder, session::waker(proxy))
+        Tools::new(device.info(), folder, waker(proxy))
     }
 
     fn session(

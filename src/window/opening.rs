@@ -8,10 +8,11 @@ use std::time::Instant;
 use winit::event_loop::EventLoopProxy;
 
 use super::deaths::OPENING;
+use super::error::{Refusal, message_of};
 use super::keeper::Orphan;
 use super::model::{File, Model};
-use super::session::Wake;
-use super::{Options, Refusal};
+use super::options::Options;
+use super::wake::Woken;
 use crate::gpu::Device;
 use crate::scene::{Scene, SceneError, Warning};
 
@@ -51,7 +52,7 @@ impl Opening {
         path: PathBuf,
         overrides: Vec<(String, String)>,
         purpose: Purpose,
-        proxy: EventLoopProxy<Wake>,
+        proxy: EventLoopProxy<Woken>,
     ) -> Self {
         let (sender, loaded) = channel();
         let (file, set) = (path.clone(), overrides.clone());
@@ -60,7 +61,7 @@ impl Opening {
         let _ = thread.spawn(move || {
             // A window that is gone needs neither.
             let _ = sender.send(Scene::load(&file, &set));
-            let _ = proxy.send_event(Wake);
+            let _ = proxy.send_event(Woken);
         });
         Self { path, overrides, purpose, loaded }
     }
@@ -89,7 +90,7 @@ impl Opening {
                 let opened = |opened| Opened { warnings, again, ..opened };
                 suited.map(opened).map_err(|e| e.to_string())
             }
-            Err(error) => Err(super::files::message_of(&error)),
+            Err(error) => Err(message_of(&error)),
         })
     }
 

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::time::Instant;
 
-use super::files::message_of;
+use super::error::message_of;
 use super::model::Model;
 use crate::igtl::{Order, Reach, command};
 use crate::scene::file::{facts, put_settings, value_of_settings};

@@ -8,8 +8,8 @@ use gilrs::{EventType, GamepadId, Gilrs};
 use parking_lot::Mutex;
 
 use super::deaths::PADS;
-use super::link::Bell;
 use super::model::{Axis, Control, Pad, Press};
+use super::wake::Bell;
 use crate::gpu::unreadable_pad;
 
 /// Time between movements of the probe while a stick is held, which sends no events meanwhile.

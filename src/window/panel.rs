@@ -3,7 +3,6 @@
 //! A panel has its own state and asks the window for what is not its own, so that none knows of the others.
 
 use std::collections::BTreeSet;
-use std::sync::Arc;
 use std::time::Instant;
 
 use egui::{Context, Key, Ui};
@@ -15,6 +14,7 @@ use super::model::Model;
 use super::picture::Frame;
 use super::statistics::Times;
 use super::tools::Tools;
+use super::wake::Wake;
 use super::way::Way;
 use crate::settings::Machine;
 
@@ -145,9 +145,6 @@ pub(super) struct DeviceFacts {
     /// Size of its largest heap of its own, bytes.
     pub(super) heap: u64,
 }
-
-/// A call, from any thread, by which the window looks at what has changed.
-pub(super) type Wake = Arc<dyn Fn() + Send + Sync>;
 
 /// What all panels share.
 pub(super) struct Common {

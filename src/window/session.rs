@@ -2,31 +2,23 @@
 
 use std::sync::Arc;
 
-use parking_lot::Mutex;
 use winit::event_loop::{ActiveEventLoop, EventLoopProxy};
 use winit::window::Window;
 
 use super::engine::Engine;
+use super::error::ViewError;
 use super::link::Link;
 use super::model::Order;
-use super::{Options, ViewError};
+use super::options::Options;
+use super::wake::{Woken, waker};
 use crate::gpu::{Device, Painter};
 use crate::scene::Scene;
-
-/// Wakes the event loop: there is news of the simulation, or of a device.
-pub(super) struct Wake;
 
 /// Window, device, simulation. Fields drop in order: the simulation ends first.
 pub(super) struct Session {
     pub(super) engine: Engine,
     pub(super) painter: Painter,
     pub(super) device: Arc<Device>,
-}
-
-/// Wakes the event loop, from any thread; one that is gone needs no news.
-pub(super) fn waker(proxy: EventLoopProxy<Wake>) -> impl Fn() + Send + Sync + 'static {
-    let proxy = Mutex::new(proxy);
-    move || drop(proxy.lock().send_event(Wake))
 }
 
 /// A window of the default size.
@@ -51,7 +43,7 @@ impl Session {
         options: &Options,
         scene: Scene,
         order: Order,
-        proxy: EventLoopProxy<Wake>,
+        proxy: EventLoopProxy<Woken>,
         link: Link,
     ) -> Result<Self, ViewError> {
         let painter = Painter::new(&device, window.clone())?;

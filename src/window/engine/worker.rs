@@ -12,7 +12,6 @@ use parking_lot::MutexGuard;
 
 use super::{
     Job, News, Past, STRIP_LONGEST, STRIP_PUT_OFF, Shared, State, VIEW3D_PUT_OFF, WINDOW_PATIENCE,
-    Wake,
 };
 use crate::gpu::{Device, GpuError};
 use crate::link::{Broadcast, Link};
@@ -23,6 +22,7 @@ use crate::ring::Ring;
 use crate::scene::Scene;
 use crate::sim::shaders::Library;
 use crate::sim::{self, SimError, Simulator, Tracer};
+use crate::wake::Wake;
 use columns::Columns;
 
 /// The last picture, and the state that it left on the device.

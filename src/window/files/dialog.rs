@@ -7,7 +7,8 @@ use egui::text::{CCursor, CCursorRange};
 use egui::text_edit::TextEditState;
 use egui::{Button, Key, RichText, ScrollArea, TextEdit, Ui};
 
-use super::{Files, Purpose, message_of};
+use super::{Files, Purpose};
+use crate::error::message_of;
 use crate::model::Model;
 use crate::recent;
 use crate::scene::SceneError;

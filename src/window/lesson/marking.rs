@@ -8,7 +8,6 @@ use glam::DAffine3;
 
 use super::history::note;
 use crate::gpu::{Device, DeviceOptions, cache_folder};
-use crate::panel::Wake;
 use crate::scene::Scene;
 use crate::scene::animation::Track;
 use crate::scene::task::Goal;
@@ -18,6 +17,7 @@ use crate::sim::{Tracer, seen};
 use crate::teach::history::Entry;
 use crate::teach::score::Touch;
 use crate::teach::{Attempt, Path, Score};
+use crate::wake::Wake;
 
 /// The attempt that is to be scored.
 pub(super) struct Order {

@@ -12,7 +12,6 @@ use crate::files::Files;
 use crate::gpu::{Device, ValidationLog};
 use crate::inputs::{self, Inputs};
 use crate::keeper::Keeper;
-use crate::link::Bell;
 use crate::model::{File, StoredTrajectory};
 use crate::opening::{self, Opened};
 use crate::output;
@@ -21,6 +20,7 @@ use crate::panels::Panels;
 use crate::session::{self, Session};
 use crate::sim;
 use crate::state::State;
+use crate::wake::{Bell, waker};
 use crate::watch::Watch;
 use crate::{Model, ViewError, console, gallery, recent, style, view3d};
 
@@ -88,7 +88,7 @@ impl Open {
                 warnings: plan.options.warnings.clone(),
                 warned: false,
                 fills: false,
-                wake: Arc::new(session::waker(plan.proxy.clone())),
+                wake: Arc::new(waker(plan.proxy.clone())),
                 asks: Vec::new(),
             },
             framing: Default::default(),
@@ -112,7 +112,7 @@ impl Open {
         let log = device.validation_log();
         let session = plan.session(device, &window, &model)?;
         window.request_redraw();
-        let watch = Watch::new(session::waker(plan.proxy.clone())).map_err(ViewError::Thread)?;
+        let watch = Watch::new(waker(plan.proxy.clone())).map_err(ViewError::Thread)?;
         watch.set(&plan.options.file);
         recent::add(&plan.options.file);
         Ok((Self::with(session, model, state, (input, window), watch), log))
