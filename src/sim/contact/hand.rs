@@ -133,6 +133,14 @@ impl<'s> Hand<'s> {
         at(to.point - to.normal * lift)
     }
 
+    /// The pose slid `by` mm (world) from the place that it is held to, pressed in by `press` mm, and the place that it is
+    /// held to then. None where there is no skin.
+    pub fn slid_by(&self, pose: &DAffine3, by: DVec3, press: f64) -> Option<(DAffine3, Spot)> {
+        let from = self.held(pose);
+        let to = self.beside(&from, by)?;
+        Some((self.slid(pose, &from, &to, press), to))
+    }
+
     /// Depth to which a face at `pose`, held to `spot`, is pressed in at its deepest point, mm; below 0 it is held above
     /// the skin. None where there is no skin before it.
     pub fn pressed(&self, pose: &DAffine3, spot: &Spot) -> Option<f64> {

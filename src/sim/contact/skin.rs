@@ -20,9 +20,10 @@ const TOUCHING: f64 = 0.1;
 const BOX_MARGIN: f32 = 1e-5;
 
 /// Hierarchies over the triangles of meshes, built when a mesh is first used as skin.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub struct Skins {
-    trees: HashMap<usize, Arc<MeshTree>>,
+    /// By mesh, each with the shape that it was built over: a program may have given the mesh another one since.
+    trees: HashMap<usize, (Arc<Mesh>, Arc<MeshTree>)>,
 }
 
 impl Skins {
@@ -32,14 +33,21 @@ impl Skins {
         let named = scene.contact.iter().flat_map(|c| &c.skin);
         let placed = named.map(|&i| &scene.instances[i]).filter(|i| i.shown);
         let bodies = placed.map(|placed| PlacedSkin {
-            tree: self
-                .trees
-                .entry(placed.mesh)
-                .or_insert_with(|| Arc::new(MeshTree::new(&scene.meshes[placed.mesh])))
-                .clone(),
+            tree: self.tree(placed.mesh, &scene.meshes[placed.mesh]),
             object_from_world: placed.world_from_object.inverse(),
         });
         Skin { bodies: bodies.collect() }
+    }
+
+    fn tree(&mut self, index: usize, mesh: &Arc<Mesh>) -> Arc<MeshTree> {
+        match self.trees.get(&index) {
+            Some((of, tree)) if Arc::ptr_eq(of, mesh) => Arc::clone(tree),
+            _ => {
+                let tree = Arc::new(MeshTree::new(mesh));
+                self.trees.insert(index, (Arc::clone(mesh), Arc::clone(&tree)));
+                tree
+            }
+        }
     }
 }
 
