@@ -10,7 +10,6 @@ use insonify::import::{self, Draft, LabelMap, Options};
 use insonify::output;
 use insonify::scene::Scene;
 use insonify::scene::mesh::Units;
-use insonify::scene::tissue::table as tissues;
 use insonify::settings::suggest;
 use insonify::volume::{Frame, Pose, frames_of_pose, transform};
 use miette::{Result, miette};
@@ -127,15 +126,6 @@ pub fn run(args: &Import) -> Result<()> {
     if let Some(Classes::Totalsegmentator) = args.classes {
         table = table.with_total_segmentator();
     }
-    if !tissues::names().any(|t| t == args.around) {
-        let remedy = suggest::among(&args.around, tissues::names());
-        return Err(miette!(help = remedy, "--around: unknown tissue `{}`", args.around));
-    }
-    if let Some(spacing) = args.spacing
-        && !(spacing.is_finite() && spacing.cmpgt(DVec3::splat(1e-3)).all())
-    {
-        return Err(miette!(help = "give mm, such as 1.5", "--spacing has to be above 0.001 mm"));
-    }
     let options = Options {
         table,
         spacing: args.spacing,
@@ -145,6 +135,9 @@ pub fn run(args: &Import) -> Result<()> {
         frame: args.frame,
         force: args.force,
     };
+    if let Some((option, cause, remedy)) = options.fault() {
+        return Err(miette!(help = remedy, "--{option}: {cause}"));
+    }
     let mut shown: Option<(String, Progress)> = None;
     let mut tell = |noun: &str, done: usize, of: usize| {
         if shown.as_ref().is_none_or(|(now, _)| now != noun) {
@@ -188,7 +181,7 @@ fn device_set(source: &Path, folder: &Path, args: &Import) -> Result<()> {
     let path = scene.finish()?;
     // What of it can be seen is known with the probe's pose and all meshes.
     notes(Scene::load(&path, &[])?.1);
-    remarks(&scene.draft);
+    scene.draft.told().iter().for_each(output::line);
     for part in &scene.draft.parts {
         output::line(format!("{}: {} triangles, {:.1} ml", part.name, part.triangles, part.volume));
     }
@@ -222,16 +215,6 @@ fn trajectory(source: &Path, file: &Path, args: &Import) -> Result<()> {
     Ok(())
 }
 
-/// Says which structures are no mesh of the scene, and what else is remarkable.
-fn remarks(draft: &Draft) {
-    for structure in &draft.left_out {
-        output::line(format!("left out: {structure}, which no scene takes"));
-    }
-    for remark in &draft.remarks {
-        output::line(format!("note: {remark}"));
-    }
-}
-
 /// Says what became of each structure, what had no tissue, and where the probe is.
 fn report(draft: &Draft) {
     for part in &draft.parts {
@@ -245,19 +228,9 @@ fn report(draft: &Draft) {
             part.name, part.tissue, part.triangles, part.volume
         ));
     }
-    remarks(draft);
+    draft.told().iter().for_each(output::line);
     let all: usize = draft.parts.iter().map(|p| p.triangles).sum();
     output::line(format!("{} meshes, {all} triangles", draft.parts.len()));
-    let unknown: Vec<_> =
-        draft.parts.iter().filter(|p| !p.known).map(|p| p.name.as_str()).collect();
-    if !unknown.is_empty() {
-        output::line(format!(
-            "{} structures had no tissue and were given {}: {}; name them in a table (--labels)",
-            unknown.len(),
-            table::UNKNOWN,
-            unknown.join(", ")
-        ));
-    }
     match &draft.view {
         Some((view, organ)) => output::line(format!(
             "the probe looks at {organ}, {:.0} mm deep; {}",

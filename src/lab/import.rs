@@ -11,6 +11,8 @@
 use glam::DVec3;
 
 use crate::scene::mesh::Units;
+use crate::scene::tissue::table as tissues;
+use crate::settings::suggest;
 use crate::volume::Frame;
 
 pub mod composed;
@@ -38,6 +40,9 @@ pub use draft::{Draft, Part, way};
 pub use labels::LabelMap;
 pub use pose::View;
 
+/// A fault of an option: its name, the cause, the remedy.
+pub type Fault = (&'static str, String, String);
+
 /// The options of an import.
 #[derive(Clone, Debug)]
 pub struct Options {
@@ -55,4 +60,20 @@ pub struct Options {
     pub frame: Option<Frame>,
     /// Replaces a scene that is there.
     pub force: bool,
+}
+
+impl Options {
+    /// The first fault of an option by itself; none of those that are right.
+    pub fn fault(&self) -> Option<Fault> {
+        if !tissues::names().any(|tissue| tissue == self.around) {
+            let cause = format!("unknown tissue `{}`", self.around);
+            return Some(("around", cause, suggest::among(&self.around, tissues::names())));
+        }
+        let is_one =
+            |spacing: DVec3| spacing.is_finite() && spacing.cmpgt(DVec3::splat(1e-3)).all();
+        let wrong = self.spacing.is_some_and(|spacing| !is_one(spacing));
+        wrong.then(|| {
+            ("spacing", "it has to be above 0.001 mm".into(), "give mm, such as 1.5".into())
+        })
+    }
 }

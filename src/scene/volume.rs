@@ -33,7 +33,7 @@ mod voxels;
 mod write;
 
 pub use dicom::segmentation::{DicomSegment, Segmentation};
-pub use grid::Frame;
+pub use grid::{Frame, lps_from_voxel};
 pub use reconstruct::{
     Compounding, Config, Fan, Filling, Interpolation, Lattice, Reconstruction, Settings,
     Transforms, frames_of_pose, reconstruct,

@@ -179,7 +179,6 @@ impl Poses {
         (0..ATTEMPTS).find_map(|attempt| {
             let count = Count { attempt, ..count };
             let base = self.base(draws, count, own);
-            let from = hand.held(&base);
             let [lateral, elevation] =
                 [LATERAL, ELEVATION].map(|part| self.part(draws, count, part));
             let along = base.transform_vector3(DVec3::new(
@@ -187,9 +186,9 @@ impl Poses {
                 elevation.unwrap_or(0.0),
                 0.0,
             ));
-            let to = hand.beside(&from, along)?;
             let press = self.part(draws, count, DEPTH).unwrap_or(PRESS);
-            let slid = hand.slid(&base, &from, &to, press) * self.turn(draws, count);
+            let (slid, to) = hand.slid_by(&base, along, press)?;
+            let slid = slid * self.turn(draws, count);
             scene.world_from_probe = hand.slid(&slid, &to, &to, press);
             let coupling = Coupling::of(scene, skins)?;
             (coupling.touch.share >= least).then_some(scene.world_from_probe)

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 
 use super::pose::View;
+use super::table::UNKNOWN;
 use crate::issue::FileError;
 use crate::output::{files, naming, obj};
 use crate::scene::check::SENSIBLE_SIZE;
@@ -145,6 +146,23 @@ impl Draft {
         for (n, part) in self.parts.iter_mut().enumerate() {
             part.priority = n as i32;
         }
+    }
+
+    /// Remarks for a person: structures that are no mesh, what is remarkable, and structures whose tissue is a guess.
+    pub fn told(&self) -> Vec<String> {
+        let left_out = self.left_out.iter();
+        let left_out = left_out.map(|part| format!("left out: {part}, which no scene takes"));
+        let remarks = self.remarks.iter().map(|remark| format!("note: {remark}"));
+        let unknown = self.parts.iter().filter(|part| !part.known);
+        let unknown: Vec<_> = unknown.map(|part| part.name.as_str()).collect();
+        let guessed = (!unknown.is_empty()).then(|| {
+            format!(
+                "{} structures had no tissue and were given {UNKNOWN}: {}; name them in a table (--labels)",
+                unknown.len(),
+                unknown.join(", ")
+            )
+        });
+        left_out.chain(remarks).chain(guessed).collect()
     }
 
     /// Writes the scene file, and returns where it is.

@@ -82,23 +82,60 @@ impl LabelMap {
             ));
         }
         let Volume { size, world_from_voxel, voxels, later, .. } = volume;
-        let (mut labels, mut layers) = (Vec::new(), Vec::new());
-        for (layer, voxels) in std::iter::once(voxels).chain(later).enumerate() {
+        let layers = std::iter::once(voxels).chain(later);
+        Self::of(path, (size, world_from_voxel), layers, &segments, remarks)
+    }
+
+    /// The label map of voxels that a program has, first axis fastest: a whole number each, 0 for none. `names` are those of
+    /// the numbers; a number without one is told as a file's is. `name` stands for a file's in messages.
+    ///
+    /// # Errors
+    /// Values that are no labels, or too many.
+    ///
+    /// # Panics
+    /// If there are not as many voxels as `size` says, or none.
+    pub fn of_voxels(
+        name: &Path,
+        (size, world_from_voxel): ([usize; 3], DAffine3),
+        voxels: Voxels,
+        names: &[(u32, String)],
+    ) -> Result<Self, FileError> {
+        let count: usize = size.iter().product();
+        assert!(count > 0 && voxels.len() == count, "{} voxels of {size:?}", voxels.len());
+        let segment = |(value, name): &(u32, String)| Segment {
+            layer: 0,
+            value: *value,
+            names: vec![name.clone()],
+        };
+        let segments: Vec<Segment> = names.iter().map(segment).collect();
+        Self::of(name, (size, world_from_voxel), [voxels], &segments, Vec::new())
+    }
+
+    /// The label map of layers of voxels; `segments` are what is said of their values, `remarks` what was said of the file.
+    fn of(
+        path: &Path,
+        (size, world_from_voxel): ([usize; 3], DAffine3),
+        layers: impl IntoIterator<Item = Voxels>,
+        segments: &[Segment],
+        mut remarks: Vec<String>,
+    ) -> Result<Self, FileError> {
+        let (mut labels, mut numbered) = (Vec::new(), Vec::new());
+        for (layer, voxels) in layers.into_iter().enumerate() {
             let (voxels, values, off) = number(path, voxels, labels.len())?;
             if off > 0.0 {
                 remarks.push(format!(
                     "values are up to {off:.1e} off whole numbers, as after scaling: the nearest ones are the labels"
                 ));
             }
-            labels.extend(values.into_iter().map(|value| segment(&segments, layer, value)));
-            layers.push(voxels);
+            labels.extend(values.into_iter().map(|value| segment(segments, layer, value)));
+            numbered.push(voxels);
         }
-        for own in &segments {
+        for own in segments {
             if !labels.iter().any(|label| (label.layer, label.value) == (own.layer, own.value)) {
                 remarks.push(empty(own));
             }
         }
-        Ok(Self { size, world_from_voxel, layers, masks: Vec::new(), labels, remarks })
+        Ok(Self { size, world_from_voxel, layers: numbered, masks: Vec::new(), labels, remarks })
     }
 
     /// Origin of each label, in words: its file, or its value in the one file.

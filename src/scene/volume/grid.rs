@@ -81,6 +81,16 @@ impl Grid {
     }
 }
 
+/// The transform from voxel indices to LPS of one to a frame, mm.
+///
+/// # Errors
+/// The fault of the numbers.
+pub fn lps_from_voxel(frame_from_voxel: &DAffine3, frame: Frame) -> Result<DAffine3, String> {
+    let DMat3 { x_axis, y_axis, z_axis } = frame_from_voxel.matrix3;
+    let (steps, origin) = ([x_axis, y_axis, z_axis], frame_from_voxel.translation);
+    Grid { steps, origin, frame, unit: 1.0 }.world_from_voxel()
+}
+
 /// Steps of a volume of two or three axes with these spacings, whose directions are the rows of `rows`
 /// (`n` by `n`, n at least 2; parts beyond three are ignored).
 pub(super) fn steps(n: usize, rows: &[f64], spacings: &[f64]) -> [DVec3; 3] {
