@@ -45,6 +45,17 @@ impl Fault {
         Self::new(format!("is cut off: it ends within {what}"), COPY_AGAIN)
     }
 
+    /// The same with its place among those that the header counts, where the file ends there.
+    fn counted(self, n: usize, count: usize) -> Self {
+        match self.remedy == COPY_AGAIN {
+            true => Self {
+                cause: format!("{}, at number {} of {count} by its header", self.cause, n + 1),
+                ..self
+            },
+            false => self,
+        }
+    }
+
     fn too_many(count: impl fmt::Display, what: &str) -> Self {
         let cause = format!("{count} {what} are too many: the limit is {MAX_ELEMENTS}");
         Self::new(cause, REDUCE)

@@ -212,15 +212,16 @@ fn vertices(
     let (Some(x), Some(y), Some(z)) = (place(b"x"), place(b"y"), place(b"z")) else {
         return Err(Fault::new("has vertices without x, y and z", EXPORT_AGAIN));
     };
-    for _ in 0..element.count {
+    for n in 0..element.count {
         let mut position = [0.0; 3];
         for (p, property) in element.properties.iter().enumerate() {
             let axis = [x, y, z].iter().position(|&axis| axis == p);
-            body.property(property, "the vertices", |value| {
+            let read = body.property(property, "the vertices", |value| {
                 if let Some(axis) = axis {
                     position[axis] = value as f32;
                 }
-            })?;
+            });
+            read.map_err(|fault| fault.counted(n, element.count))?;
         }
         body.end_row();
         positions.push(position);
@@ -240,14 +241,15 @@ fn polygons(
         return skip(element, body);
     };
     let mut corners = Vec::new();
-    for _ in 0..element.count {
+    for n in 0..element.count {
         corners.clear();
         for (p, property) in element.properties.iter().enumerate() {
-            body.property(property, "the faces", |value| {
+            let read = body.property(property, "the faces", |value| {
                 if p == list {
                     corners.push(value);
                 }
-            })?;
+            });
+            read.map_err(|fault| fault.counted(n, element.count))?;
         }
         body.end_row();
         take(&corners)?;

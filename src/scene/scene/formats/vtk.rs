@@ -11,9 +11,17 @@ use super::{
 use crate::issue::Issue;
 use crate::scene::mesh::{MAX_ELEMENTS, Parts, Soup};
 
-/// Remedy for data of VTK that are no surface.
-pub(super) const SURFACE: &str =
-    "extract its surface (in ParaView: Extract Surface), and save that as polydata";
+/// Remedy for data of VTK, of this kind, that are no surface.
+pub(super) fn not_polydata(kind: &[u8]) -> &'static str {
+    let volumes = [&b"STRUCTURED_POINTS"[..], b"ImageData"];
+    match volumes.iter().any(|volume| volume.eq_ignore_ascii_case(kind)) {
+        true => {
+            "it is a volume: save it as .nrrd or .mha (in ParaView and 3D Slicer: Save Data), and `import` that as a label \
+             map, or fuse it"
+        }
+        false => "extract its surface (in ParaView: Extract Surface), and save that as polydata",
+    }
+}
 
 pub(in crate::scene) fn read(path: &Path, bytes: &[u8]) -> Result<Parts, Vec<Issue>> {
     surface(path, parse(bytes))
@@ -54,7 +62,7 @@ fn parse(bytes: &[u8]) -> Result<(Soup, Faces), Fault> {
                 if !kind.eq_ignore_ascii_case(b"POLYDATA") {
                     let cause =
                         format!("holds a dataset `{}`, and only POLYDATA is read", shown(kind));
-                    return Err(Fault::new(cause, SURFACE).at(line));
+                    return Err(Fault::new(cause, not_polydata(kind)).at(line));
                 }
             }
             b"POINTS" => {

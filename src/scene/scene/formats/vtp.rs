@@ -8,7 +8,7 @@ use quick_xml::events::{BytesStart, Event};
 
 use arrays::{Appended, Array, Form, Numbers, Place};
 
-use super::vtk::{Cells, SURFACE, offset_cells};
+use super::vtk::{Cells, not_polydata, offset_cells};
 use super::words::shown;
 use super::xml::{self, attribute, number};
 use super::{EXPORT_AGAIN, Faces, Fault, Scalar};
@@ -122,7 +122,7 @@ fn file(element: &BytesStart<'_>) -> Result<Form, Fault> {
     let kind = value("type")?;
     if kind != "PolyData" {
         let cause = format!("holds data of type `{}`, and only PolyData is read", shown(&*kind));
-        return Err(Fault::new(cause, SURFACE));
+        return Err(Fault::new(cause, not_polydata(kind.as_bytes())));
     }
     let packed = match &*value("compressor")? {
         "" => false,

@@ -85,6 +85,7 @@ fn planted_faults_are_named() {
         ("3 0 2 1 0", "3 0 2 4 0", "vertex 4, counted from 0, and there are 4"),
         ("3 0 2 1 0", "3 0 2 -1 0", "vertex -1"),
         ("3 0 2 1 0", "3000 0 2 1 0", "ends within the faces"),
+        ("element face 2", "element face 3", "at number 3 of 3 by its header"),
         ("3 0 2 1 0", "-3 0 2 1 0", "a list of -3 values"),
         ("1 0 9 0\n", "1 x 9 0\n", "line 18: `x` is no number"),
     ] {

@@ -79,6 +79,8 @@ fn planted_faults_are_named() {
         ("# vtk", "# vdk", "is no VTK file"),
         ("ASCII", "UTF-8", "line 3: is neither ASCII nor BINARY"),
         ("POLYDATA", "UNSTRUCTURED_GRID", "holds a dataset `UNSTRUCTURED_GRID`"),
+        ("POLYDATA", "UNSTRUCTURED_GRID", "Extract Surface"),
+        ("POLYDATA", "structured_points", "it is a volume"),
         ("POINTS 4", "POINTS 5000000", "too many"),
         ("POINTS 4", "POINTS 4000000000", "too many"),
         ("POINTS 4 float", "POINTS 4 quad", "line 10: `quad` is no type"),

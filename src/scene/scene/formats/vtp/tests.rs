@@ -158,6 +158,8 @@ fn planted_faults_are_named() {
     let text = String::from_utf8(text).expect("text");
     for (from, to, cause) in [
         ("PolyData\" version", "ImageData\" version", "holds data of type `ImageData`"),
+        ("PolyData\" version", "ImageData\" version", "it is a volume"),
+        ("PolyData\" version", "UnstructuredGrid\" version", "Extract Surface"),
         ("header_type", "compressor=\"vtkLZ4DataCompressor\" header_type", "packed by `vtkLZ4"),
         ("NumberOfPoints=\"4\"", "NumberOfPoints=\"5\"", "has 12 numbers of 15"),
         ("NumberOfPoints=\"4\"", "NumberOfPoints=\"4000000000\"", "too many"),
