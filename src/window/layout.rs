@@ -2,7 +2,9 @@
 
 use std::time::Instant;
 
-use egui::{CentralPanel, Frame as Space, Panel as Strip, Rect, RichText, TextStyle, Ui};
+use egui::{
+    CentralPanel, Frame as Space, Panel as Strip, Rect, RichText, TextStyle, Ui, UiBuilder,
+};
 use glam::DVec3;
 
 use super::bmode;
@@ -43,7 +45,7 @@ pub(super) fn show(ui: &mut Ui, model: &mut Model, state: &mut State, seen: Seen
     each(model, state, seen, |panel, desk| {
         if let Some(Dock::Right(width)) = open(panel, desk) {
             let strip = Strip::right(panel.row().name).resizable(false).exact_size(width);
-            strip.show(ui, |ui| panel.show(ui, desk));
+            strip.show(ui, |ui| within(ui, |ui| panel.show(ui, desk)));
         }
     });
     bar(ui, model, state, seen.now);
@@ -56,7 +58,7 @@ pub(super) fn show(ui: &mut Ui, model: &mut Model, state: &mut State, seen: Seen
             return;
         }
         let strip = Strip::bottom(panel.row().name).resizable(false).exact_size(height);
-        strip.show(ui, |ui| panel.show(ui, desk));
+        strip.show(ui, |ui| within(ui, |ui| panel.show(ui, desk)));
     });
     let shared = beside_image(ui, model, state, seen, alone);
     let (image, held) = match alone {
@@ -104,11 +106,19 @@ fn open(panel: &dyn Panel, desk: &Desk<'_>) -> Option<Dock> {
     panel.is_open(desk.model, &desk.common.open).then_some(panel.row().dock)
 }
 
+/// Draws into the room of a strip, which keeps its size whatever the content wants: the image would move under the hand.
+fn within(ui: &mut Ui, content: impl FnOnce(&mut Ui)) {
+    let room = ui.available_rect_before_wrap();
+    content(&mut ui.new_child(UiBuilder::new().max_rect(room)));
+    ui.advance_cursor_after_rect(room);
+}
+
 /// Draws the buttons of the panels, and the controls of the loop: one below the other where there is no room beside each other.
 fn bar(ui: &mut Ui, model: &mut Model, state: &mut State, now: Instant) {
     let rows = if ui.available_width() < LOOP + toggled(ui, model, state) { 2 } else { 1 };
-    Strip::bottom("bar").resizable(false).exact_size(cine::HEIGHT * rows as f32).show(ui, |ui| {
-        match rows {
+    let strip = Strip::bottom("bar").resizable(false).exact_size(cine::HEIGHT * rows as f32);
+    strip.show(ui, |ui| {
+        within(ui, |ui| match rows {
             1 => drop(ui.horizontal_centered(|ui| {
                 toggles(ui, model, state, now);
                 ui.separator();
@@ -119,7 +129,7 @@ fn bar(ui: &mut Ui, model: &mut Model, state: &mut State, now: Instant) {
                 ui.horizontal(|ui| toggles(ui, model, state, now));
                 ui.horizontal(|ui| cine::show(ui, model, &mut state.common.tools, now));
             }
-        }
+        });
     });
 }
 
@@ -199,7 +209,7 @@ fn beside_image(
     each(model, state, seen, |panel, desk| {
         if let Some(Dock::Left(width)) = open(panel, desk) {
             let strip = Strip::left(panel.row().name).resizable(false).exact_size(width);
-            strip.show(ui, |ui| panel.show(ui, desk));
+            strip.show(ui, |ui| within(ui, |ui| panel.show(ui, desk)));
         }
     });
     width.map(|width| (room, width))
