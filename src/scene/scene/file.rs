@@ -38,7 +38,7 @@ pub use again::SceneFile;
 pub use document::quoted;
 pub use document::{Document, Source};
 pub use error::SceneError;
-pub use known::{facts, keys_below, paths, value, value_of_settings};
+pub use known::{default, facts, keys_below, paths, value, value_of_settings};
 pub use paper::paper;
 pub use placing::SCALES;
 pub use probe::stated as stated_pose;

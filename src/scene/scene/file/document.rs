@@ -24,6 +24,10 @@ use paths::{find, insert};
 /// Largest scene file, bytes: they hold names and numbers, not meshes.
 const MAX_TEXT: u64 = 4 << 20;
 
+/// The name that stands in place of a file's where a setting is at fault that a command line, a client, the window or a program
+/// has put in.
+const OVERRIDE: &str = "setting";
+
 /// Most parts of a path to a value; the longest key of a scene file has six. What is nested deeper than the stack allows
 /// would end the program, whoever sent it.
 const MAX_PARTS: usize = 16;
@@ -149,7 +153,7 @@ impl Source {
                     set.segments.len()
                 );
                 let remedy = "write it as docs/scenes.md does, like `imaging.gain`";
-                return Err(SceneError::file(Path::new("--set"), message, remedy));
+                return Err(SceneError::file(Path::new(OVERRIDE), message, remedy));
             }
             let segments: Vec<&str> = set.segments.iter().map(String::as_str).collect();
             insert(&mut document.root, &segments, value, &key)
@@ -196,7 +200,7 @@ impl Source {
     fn error(&self, span: Range<usize>, message: String, remedy: Option<String>) -> SceneError {
         match self.in_override(&span) {
             Some((set, span)) => {
-                SceneError::at(Path::new("--set"), &set.shown, span, message, remedy)
+                SceneError::at(Path::new(OVERRIDE), &set.shown, span, message, remedy)
             }
             None => SceneError::at(&self.path, &self.text, span, message, remedy),
         }

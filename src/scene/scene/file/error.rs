@@ -19,7 +19,7 @@ pub struct SceneError {
     /// Remedy.
     #[help]
     pub remedy: Option<String>,
-    /// The scene file, or `--set` where an override is at fault.
+    /// The scene file, or `setting` where an override is at fault.
     pub file: PathBuf,
     /// Line, from 1; 0 where there is none.
     pub line: usize,

@@ -2,7 +2,8 @@
 
 use super::document::{LISTS, segments};
 use super::schema::reference;
-use super::setting::setting;
+use super::setting::{Setting, setting};
+use super::table::Key;
 use crate::scene::Scene;
 use crate::settings::{Facts, Group, Settings, Value};
 
@@ -11,17 +12,26 @@ use crate::settings::{Facts, Group, Settings, Value};
 /// # Errors
 /// Cause and remedy, where scene files have no such key.
 pub fn facts(path: &str) -> Result<&'static Facts, String> {
+    Ok(found(path)?.facts)
+}
+
+/// The value of a key where a file does not state it; none where there is none, or not always the same one.
+pub fn default(path: &str) -> Option<Value> {
+    found(path).ok()?.default
+}
+
+fn found(path: &str) -> Result<Setting, String> {
     let parts = segments(path);
     if let [key] = &parts[..] {
         let tables = reference();
         let title = tables.into_iter().find(|(table, _)| table.is_empty());
         let found = title.and_then(|(_, keys)| keys.into_iter().find(|known| known.path == *key));
-        if let Some(found) = found {
-            return Ok(found.facts);
+        if let Some(Key { facts, form, usual, .. }) = found {
+            return Ok(Setting { facts, form, default: usual });
         }
     }
     match setting(&parts) {
-        Ok(Some(found)) => Ok(found.facts),
+        Ok(Some(found)) => Ok(found),
         Ok(None) => Err(format!("`{path}` is a table; name a key in it")),
         Err((message, remedy)) => Err(format!("{message}; {remedy}")),
     }
@@ -83,6 +93,15 @@ mod tests {
         assert!(paths().count() > 150);
         for path in paths() {
             assert!(facts(&path).is_ok(), "{path}: {:?}", facts(&path).err());
+        }
+        for (path, value) in [
+            ("imaging.gain", Some(Value::Number(16.0))),
+            ("imaging.exam", Some(Value::Word("general"))),
+            ("probe.depth", None),
+            ("tissues.liver.speed", None),
+            ("nothing.at_all", None),
+        ] {
+            assert_eq!(default(path), value, "{path}");
         }
         assert!(facts("imaging.gian").unwrap_err().contains("did you mean `gain`?"));
         assert!(facts("imaging").unwrap_err().contains("is a table"));

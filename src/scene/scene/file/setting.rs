@@ -2,7 +2,8 @@
 
 use super::document::{LISTS, Misfit, quoted};
 use super::schema::reference;
-use crate::settings::{Facts, Form, suggest};
+use super::table::Key;
+use crate::settings::{Facts, Form, Value, suggest};
 
 /// A key of a scene file, found by its path.
 pub struct Setting {
@@ -10,6 +11,8 @@ pub struct Setting {
     pub facts: &'static Facts,
     /// The form of its values.
     pub form: Form,
+    /// Its value where a file does not state it; none where there is none, or not always the same one.
+    pub default: Option<Value>,
 }
 
 /// Number of a path's parts before its key: `imaging`, or `tissues` and a name.
@@ -35,8 +38,8 @@ pub fn setting(path: &[String]) -> Result<Option<Setting>, Misfit> {
         return Ok(None);
     };
     let key = rest.join(".");
-    if let Some(found) = keys.iter().find(|k| k.path == key) {
-        return Ok(Some(Setting { facts: found.facts, form: found.form }));
+    if let Some(Key { facts, form, usual, .. }) = keys.iter().find(|k| k.path == key) {
+        return Ok(Some(Setting { facts, form: *form, default: usual.clone() }));
     }
     let below = format!("{key}.");
     if keys.iter().any(|k| k.path.starts_with(&below)) {

@@ -35,6 +35,8 @@ pub struct Key {
     pub form: Form,
     /// Its default, as the reference writes it.
     pub default: String,
+    /// That as a value; none where there is none, or not always the same one.
+    pub usual: Option<Value>,
 }
 
 /// The keys of a group whose defaults are not always the same, in the table `below` of theirs; `default` says what
@@ -51,6 +53,7 @@ pub(super) fn keys<T: Group>(
             "" => facts.default.unwrap_or_default().to_owned(),
             words => words.to_owned(),
         },
+        usual: None,
     })
 }
 
@@ -67,8 +70,9 @@ pub(super) fn defaults<T: Group + Default>(below: &'static str) -> impl Iterator
         }
         (Some(words), _) => words.to_owned(),
     };
+    let usual = |row: &Row<T>| row.facts.default.is_none().then(|| (row.get)(&T::default()));
     let all = keys::<T>(below, "").zip(T::rows());
-    all.map(move |(key, row)| Key { default: value(row), ..key })
+    all.map(move |(key, row)| Key { default: value(row), usual: usual(row), ..key })
 }
 
 /// A table with the keys of `K`.

@@ -227,7 +227,7 @@ fn wrong_overrides_are_shown_as_such() {
     ] {
         let error = case.load(SCENE, &[(path, value)]).map(|_| ()).expect_err(path);
         let help = error.remedy.clone().unwrap_or_default();
-        assert_eq!(error.file, Path::new("--set"), "{error}");
+        assert_eq!(error.file, Path::new("setting"), "{error}");
         assert!(error.message.contains(cause), "{error}");
         assert!(format!("{}{help}", error.message).contains(remedy), "{error} {help}");
     }
@@ -312,7 +312,7 @@ fn settings_that_keep_something_out_of_the_picture_are_told_with_their_line() {
     assert_eq!(told.len(), 2, "{told:?}");
     let set = [("probe.slice_thickness", "0")];
     let (_, warnings) = Case::new().load("[probe]\npreset = \"linear\"\n", &set).expect("in range");
-    assert!(warnings[0].to_string().starts_with("warning: --set: line 1: "), "{warnings:?}");
+    assert!(warnings[0].to_string().starts_with("warning: setting: line 1: "), "{warnings:?}");
 }
 
 #[test]

@@ -18,7 +18,7 @@ impl Keys for VaryKeys {
     fn keys() -> Vec<Key> {
         let key = |p: Parameter| {
             let form = Form::Several(p.form());
-            Key { path: p.key(), facts: p.facts, form, default: String::new() }
+            Key { path: p.key(), facts: p.facts, form, default: String::new(), usual: None }
         };
         Parameter::all().map(key).collect()
     }

@@ -101,7 +101,7 @@ fn values_out_of_range_are_refused_with_their_key() {
     }
     // A mistake in an override is reported there.
     let error = case.load(SCENE, &[("vary.gain", "[500]")]).map(|_| ()).expect_err("out of range");
-    assert!(error.to_string().starts_with("--set:1:"), "{error}");
+    assert!(error.to_string().starts_with("setting:1:"), "{error}");
 }
 
 #[test]
