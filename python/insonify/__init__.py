@@ -32,10 +32,24 @@ from insonify import _insonify
 sys.exit(_insonify.compile_standard_input())
 """])
 
+from . import poses  # noqa: E402
 from ._insonify import Frame, InsonifyError, Scene, SceneError, devices  # noqa: E402
 from .datasets import make_dataset  # noqa: E402
 from .files import save  # noqa: E402
+from .importing import import_labels  # noqa: E402
 from .simulator import Frames, Simulator  # noqa: E402
 
 __version__ = _insonify.__version__
-__all__ = ["Frame", "Frames", "InsonifyError", "Scene", "SceneError", "Simulator", "devices", "make_dataset", "save"]
+__all__ = [
+    "Frame",
+    "Frames",
+    "InsonifyError",
+    "Scene",
+    "SceneError",
+    "Simulator",
+    "devices",
+    "import_labels",
+    "make_dataset",
+    "poses",
+    "save",
+]

@@ -62,6 +62,21 @@ def save(
 ) -> None:
     """As insonify.save, which gathers these facts of frames."""
 
+def import_labels(
+    voxels: NDArray[Any],
+    size: list[int],
+    affine: ArrayLike,
+    frame: str,
+    names: list[tuple[int, str]],
+    folder: str,
+    classes: str | None,
+    look_at: str | None,
+    around: str,
+    spacing: list[float] | None,
+    force: bool,
+) -> tuple[str, list[str]]:
+    """As insonify.import_labels, which has the defaults. Returns the scene file, and what is to be said of it."""
+
 def driver_environment() -> list[tuple[str, str]]:
     """Variables that make Mesa's software driver compile in a third of the time; import sets them."""
 
@@ -121,11 +136,17 @@ class Scene:
         """The value of a key; `default` where it is not set, or scene files have no such key."""
     def update(self, settings: Mapping[str, Any]) -> None:
         """Sets several keys, one after the other."""
+    def __eq__(self, other: object) -> bool:
+        ...
     def __copy__(self) -> Scene:
         """A scene of its own with the same anatomy, settings, pose, shapes and time; pickle makes one in another
         process, which reads the files again that the scene names."""
     def describe(self, key: str) -> dict[str, Any]:
-        """unit, range, words (its choices) and meaning of a key."""
+        """unit, range, words (its choices), meaning and default of a key; default: None where there is none, or where it is
+        not always the same, as that of a preset."""
+    def level(self, number: int) -> dict[str, Any]:
+        """The settings of level `number` of live quality: 0 is the scene's own, each further one costs two thirds of the one
+        before, down to about a thirtieth. scene.update(scene.level(5)) sets them. IndexError: no such level."""
     @staticmethod
     def keys() -> list[str]:
         """All keys of scene files: `mesh.NAME.tissue` stands for those of every mesh."""
@@ -146,6 +167,20 @@ class Scene:
     pose: NDArray[np.float64]
     """World from probe space [4, 4], mm: x lateral, y elevation, z depth, the origin in the middle of the face. Taken
     only if it is a rotation with a shift; what is read is a copy that cannot be written into."""
+    def contact(self, pose: ArrayLike | None = None) -> dict[str, float] | None:
+        """Contact of the probe's face with the skin, at `pose` or where the probe is: `share` of the face that is coupled, 0
+        to 1, and `depth`, mm, that it is pushed in, the mean over the face. None of a scene without [contact]."""
+    def pose_on_skin(
+        self,
+        pose: ArrayLike | None = None,
+        *,
+        by: ArrayLike = (0, 0),
+        press: float = 1.5,
+        upright: bool = False,
+    ) -> NDArray[np.float64]:
+        """The pose [4, 4] on the skin that `pose`, or the probe's own, is slid to: by `by` mm along the skin, lateral and
+        elevation, turned with it as a hand turns; pressed in by `press` mm where it is deepest. upright: turned so that it
+        looks along the skin's normal. The scene's own pose stays. ValueError: a scene without [contact], no skin there."""
     def set_vertices(self, mesh: str, vertices: ArrayLike) -> None:
         """Moves the vertices [N, 3] (mm) of a mesh that was made of arrays; its tissue moves along. The next frame
         shows it without reading or building anything anew."""

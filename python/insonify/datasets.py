@@ -26,6 +26,9 @@ def make_dataset(
     check: only checks the plan. heard(done, samples) is called after each sample; what it raises ends the run.
     Returns samples, parts, made, kept, sheet (the path of the contact sheet; None without parts), classes, their colours
     (red, green and blue of each), warnings.
-    SceneError: a mistake in the plan, before any frame is made. InsonifyError: no room, no device.
+    SceneError: a mistake in the plan, before any frame is made. InsonifyError: no room, no device. ValueError: no shard.
     """
+    index, count = shard
+    if index < 0 or count < 1:
+        raise ValueError(f"shard {shard}: of n shards the first is (0, n), the last (n - 1, n)")
     return _insonify.make_dataset(plan, output, shard, resume, check, device, tracer, heard or (lambda done, samples: None))

@@ -20,11 +20,11 @@ AT_ONCE = 64
 PATIENCE = 0.2
 
 
-@dataclass
+@dataclass(repr=False, eq=False)
 class Frames:
     """Frames of a loop: arrays of N, one for each frame.
 
-    bmode: uint8 [N, H, W]. pose: float64 [N, 4, 4], world from probe, mm. What else was wanted stands under its name:
+    bmode: uint8 [N, H, W]; sector: bool [H, W], true inside the sector. pose: float64 [N, 4, 4], world from probe, mm. What else was wanted stands under its name:
     iq complex64 [N, L, K], envelope, log and rf float32 [N, L, K] (rf with more samples to a line). labels is a
     dictionary of such arrays, legend what their numbers mean; probe are the probe's settings by their keys.
     """
@@ -32,6 +32,7 @@ class Frames:
     bmode: np.ndarray
     pose: np.ndarray
     axes: dict[str, np.ndarray]
+    sector: np.ndarray
     others: dict[str, np.ndarray] = field(default_factory=dict)
     labels: dict[str, np.ndarray] = field(default_factory=dict)
     legend: dict[str, Any] = field(default_factory=dict)
@@ -39,6 +40,18 @@ class Frames:
 
     def __len__(self) -> int:
         return len(self.bmode)
+
+    def __repr__(self) -> str:
+        count, height, width = self.bmode.shape
+        had = ", ".join(["bmode", *self.others, *(["labels"] if self.labels else [])])
+        return f"<insonify.Frames {count} of {width} x {height}: {had}>"
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Frames):
+            return NotImplemented
+        mine, others = ({"bmode": f.bmode, "pose": f.pose, **f.others, **f.labels} for f in (self, other))
+        alike = mine.keys() == others.keys() and self.probe == other.probe
+        return alike and all(np.array_equal(mine[name], others[name], equal_nan=mine[name].dtype.kind in "fc") for name in mine)
 
     def _other(self, name: str) -> np.ndarray:
         if name in self.others:
@@ -107,6 +120,7 @@ class Simulator(_insonify.Simulator):
         axes: dict[str, np.ndarray] = {}
         legend: dict[str, Any] = {}
         probe: dict[str, Any] = {}
+        sector: np.ndarray = np.empty(0, bool)
         counted = _counted(count, progress)
         start, at_once = 0, 1
         while start < count:
@@ -124,6 +138,7 @@ class Simulator(_insonify.Simulator):
                 i = next(counted)
                 axes = axes or frame.axes
                 probe = probe or frame.probe
+                sector = sector if sector.size else frame.sector
                 for name in ("bmode", "pose", *wanted):
                     if name != "labels":
                         _put(rows, name, i, count, getattr(frame, name))
@@ -136,7 +151,7 @@ class Simulator(_insonify.Simulator):
             at_once = max(1, min(AT_ONCE, 2 * at_once, int(PATIENCE / max(each, 1e-6))))
             start = end
         next(counted, None)
-        return Frames(rows.pop("bmode"), rows.pop("pose"), axes, rows, labels, legend, probe)
+        return Frames(rows.pop("bmode"), rows.pop("pose"), axes, sector, rows, labels, legend, probe)
 
 
 def _end(start: int, most: int, times: Sequence[float] | None, labels: bool) -> int:

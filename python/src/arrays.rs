@@ -9,6 +9,9 @@ use pyo3::types::PyDict;
 /// How far a pose's axes may be from unit length and right angles: what trackers round, no scale.
 const RIGID: f64 = 1e-3;
 
+/// Largest coordinate of a vertex, mm: above it single precision is coarser than a wavelength.
+const FARTHEST: f64 = 1e6;
+
 /// An array of real, finite numbers in C order whatever its type was. `None` in `shape` stands for any length.
 pub fn reals<'py>(
     value: &Bound<'py, PyAny>,
@@ -60,6 +63,11 @@ pub fn triangles(value: &Bound<'_, PyAny>) -> PyResult<Vec<[u32; 3]>> {
 /// Positions of an array [N, 3], mm.
 pub fn positions(value: &Bound<'_, PyAny>) -> PyResult<Vec<[f32; 3]>> {
     let array = reals(value, "vertices", &[None, Some(3)])?;
+    if let Some(far) = array.as_slice()?.iter().find(|v| v.abs() > FARTHEST) {
+        let text =
+            format!("vertices reach {far:e}; they are mm, and no body is larger than {FARTHEST:e}");
+        return Err(PyValueError::new_err(text));
+    }
     Ok(array.as_slice()?.chunks_exact(3).map(|p| [p[0] as f32, p[1] as f32, p[2] as f32]).collect())
 }
 

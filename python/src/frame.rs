@@ -9,9 +9,10 @@ use insonify::sim::labels::{LabelValues, Labels};
 use insonify::sim::{layout, rf};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyTuple};
 
 use crate::arrays::{self, shaped};
+use crate::kept_frame;
 use crate::save;
 use crate::simulator::Simulator;
 
@@ -64,7 +65,8 @@ pub struct Picture {
 /// L scanlines, K axial samples, an image of H rows and W columns.
 #[pyclass(frozen, module = "insonify")]
 pub struct Frame {
-    simulator: Py<Simulator>,
+    /// None of a frame that was unpickled: it has what was read of it before.
+    simulator: Option<Py<Simulator>>,
     number: u64,
     picture: Picture,
     contents: Mutex<Vec<(Kind, Contents)>>,
@@ -74,7 +76,7 @@ pub struct Frame {
 
 impl Frame {
     pub fn new(
-        simulator: Py<Simulator>,
+        simulator: Option<Py<Simulator>>,
         number: u64,
         picture: Picture,
         contents: Vec<(Kind, Contents)>,
@@ -99,8 +101,12 @@ impl Frame {
         if let Some(kept) = kept {
             return Ok(kept);
         }
-        let simulator = self.simulator.get();
-        let contents = simulator.contents(py, self.number, kind, &self.picture.probe)?;
+        let Some(simulator) = &self.simulator else {
+            return Err(PyRuntimeError::new_err(
+                "this frame was unpickled: it has what was read of it before; name the rest in frame(want=...)",
+            ));
+        };
+        let contents = simulator.get().contents(py, self.number, kind, &self.picture.probe)?;
         all().push((kind, contents.clone()));
         Ok(contents)
     }
@@ -303,6 +309,32 @@ impl Frame {
     fn _repr_png_(&self) -> Vec<u8> {
         let Picture { constants, width, height, rgba, .. } = &self.picture;
         grey_png([*width, *height], rgba, f64::from(constants.pixel_pitch), None)
+    }
+
+    /// The frame as `pickle` keeps it: with what was read of it.
+    fn __reduce__<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
+        let contents = self.contents.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        kept_frame::kept(py, self.number, &self.picture, &contents)
+    }
+
+    /// A frame cannot be changed: its copy is itself.
+    fn __copy__(slf: Bound<'_, Self>) -> Bound<'_, Self> {
+        slf
+    }
+
+    fn __deepcopy__<'py>(slf: Bound<'py, Self>, _memo: &Bound<'_, PyAny>) -> Bound<'py, Self> {
+        slf
+    }
+
+    /// True for the same image, made with the same constants at the same place.
+    fn __eq__(&self, other: &Self) -> bool {
+        let (a, b) = (&self.picture, &other.picture);
+        a.rgba == b.rgba
+            && bytemuck::bytes_of(&a.constants) == bytemuck::bytes_of(&b.constants)
+            && a.pose == b.pose
     }
 
     fn __repr__(&self) -> String {

@@ -31,7 +31,7 @@ pub fn keys<'py>(py: Python<'py>, probe: &Probe) -> PyResult<Bound<'py, PyDict>>
 }
 
 /// The probe of such settings.
-fn probe(keys: &Bound<'_, PyDict>) -> PyResult<Probe> {
+pub fn probe(keys: &Bound<'_, PyDict>) -> PyResult<Probe> {
     let mut probe = Probe::linear();
     let all = || Probe::rows().iter();
     // The arrangement first: others are of one.

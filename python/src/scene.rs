@@ -6,13 +6,16 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use insonify::scene::file::{self, SceneFile};
 use insonify::scene::shipped;
+use insonify::sim::contact::PRESS;
 use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyIterator, PyList, PyTuple};
 
 use crate::arrays;
 use crate::error::{SceneError, mistaken};
+use crate::levels;
 use crate::pickle;
+use crate::skin;
 use crate::state::State;
 use crate::toml;
 use crate::written::Written;
@@ -123,6 +126,10 @@ impl Scene {
     /// that the key does not take; the scene is then as it was.
     fn __setitem__(&self, py: Python<'_>, key: &str, value: &Bound<'_, PyAny>) -> PyResult<()> {
         let text = (!value.is_none()).then(|| toml::text(value)).transpose()?;
+        // A key that there is not would be taken back without a word.
+        if text.is_none() && file::keys_below(key).is_empty() {
+            file::facts(key).map_err(PyKeyError::new_err)?;
+        }
         let set = || self.state.lock().unwrap_or_else(PoisonError::into_inner).set(key, text);
         py.detach(set).map_err(|e| mistaken(&e))
     }
@@ -155,7 +162,8 @@ impl Scene {
         Ok(())
     }
 
-    /// unit, range, words (its choices) and meaning of a key.
+    /// unit, range, words (its choices), meaning and default of a key; default: None where there is none, or where it is
+    /// not always the same, as that of a preset.
     fn describe<'py>(&self, py: Python<'py>, key: &str) -> PyResult<Bound<'py, PyDict>> {
         let facts = file::facts(key).map_err(PyKeyError::new_err)?;
         let out = PyDict::new(py);
@@ -163,7 +171,15 @@ impl Scene {
         out.set_item("range", facts.range)?;
         out.set_item("words", facts.words())?;
         out.set_item("meaning", facts.meaning())?;
+        let default = file::default(key).map(|value| toml::object(py, &value, facts.form));
+        out.set_item("default", default.transpose()?)?;
         Ok(out)
+    }
+
+    /// The settings of level `number` of live quality: 0 is the scene's own, each further one costs two thirds of the one
+    /// before, down to about a thirtieth. scene.update(scene.level(5)) sets them. IndexError: no such level.
+    fn level<'py>(&self, py: Python<'py>, number: usize) -> PyResult<Bound<'py, PyDict>> {
+        levels::level(py, &self.lock(py).scene, number)
     }
 
     /// All keys of scene files: `mesh.NAME.tissue` stands for those of every mesh.
@@ -230,6 +246,44 @@ impl Scene {
         Ok(())
     }
 
+    /// Contact of the probe's face with the skin, at `pose` or where the probe is: `share` of the face that is coupled, 0
+    /// to 1, and `depth`, mm, that it is pushed in, the mean over the face. None of a scene without [contact].
+    #[pyo3(signature = (pose = None))]
+    fn contact<'py>(
+        &self,
+        py: Python<'py>,
+        pose: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let pose = pose.map(arrays::pose).transpose()?;
+        let mut state = self.lock(py);
+        let pose = pose.unwrap_or(state.scene.world_from_probe);
+        let Some(touch) = skin::contact(&mut state, &pose) else { return Ok(None) };
+        let out = PyDict::new(py);
+        out.set_item("share", touch.share)?;
+        out.set_item("depth", touch.depth)?;
+        Ok(Some(out))
+    }
+
+    /// The pose [4, 4] on the skin that `pose`, or the probe's own, is slid to: by `by` mm along the skin, lateral and
+    /// elevation, turned with it as a hand turns; pressed in by `press` mm where it is deepest. upright: turned so that it
+    /// looks along the skin's normal. The scene's own pose stays. ValueError: a scene without [contact], no skin there.
+    #[pyo3(signature = (pose = None, *, by = [0.0, 0.0], press = PRESS, upright = false), text_signature = "($self, pose=None, *, by=(0, 0), press=1.5, upright=False)")]
+    fn pose_on_skin<'py>(
+        &self,
+        py: Python<'py>,
+        pose: Option<&Bound<'py, PyAny>>,
+        by: [f64; 2],
+        press: f64,
+        upright: bool,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let pose = pose.map(arrays::pose).transpose()?;
+        let mut state = self.lock(py);
+        let pose = pose.unwrap_or(state.scene.world_from_probe);
+        let held = skin::held(&mut state, &pose, by, press, upright)?;
+        drop(state);
+        arrays::rows(py, &held)
+    }
+
     /// Moves the vertices [N, 3] (mm) of a mesh that was made of arrays; its tissue moves along. The next frame
     /// shows it without reading or building anything anew.
     pub fn set_vertices(
@@ -268,6 +322,11 @@ impl Scene {
                 "a placement that flattens the mesh: its determinant is 0",
             ));
         }
+        if wanted.is_some_and(|map| map.matrix3.determinant() < 0.0) {
+            return Err(PyValueError::new_err(
+                "a placement that mirrors the mesh, whose inside would be outside: its determinant is negative",
+            ));
+        }
         let mut state = self.lock(py);
         let instance = state.instance(mesh)?;
         let now = state.scene.instances[instance].world_from_object;
@@ -292,6 +351,15 @@ impl Scene {
         self.__copy__(py)
     }
 
+    /// True for the same scene with the same changes, shapes, pose and time.
+    fn __eq__(&self, py: Python<'_>, other: &Self) -> bool {
+        if Arc::ptr_eq(&self.state, &other.state) {
+            return true;
+        }
+        let other = other.lock(py).clone();
+        self.lock(py).is_same(&other)
+    }
+
     /// The scene as `pickle` keeps it.
     fn __reduce__<'py>(
         &self,
@@ -301,7 +369,7 @@ impl Scene {
         pickle::kept(py, &state)
     }
 
-    fn __repr__(&self, py: Python<'_>) -> String {
+    pub fn __repr__(&self, py: Python<'_>) -> String {
         let state = self.lock(py);
         let scene = &state.scene;
         format!(

@@ -36,7 +36,7 @@ impl Simulator {
             running.images(&mut state, &wanted, &together)
         })?;
         let frame = |Taken { number, picture, contents }| {
-            Frame::new(slf.clone().unbind(), number, picture, contents)
+            Frame::new(Some(slf.clone().unbind()), number, picture, contents)
         };
         Ok(taken.into_iter().map(frame).collect())
     }
@@ -87,6 +87,12 @@ impl Drop for Simulator {
     }
 }
 
+/// A seed that is one.
+fn seed_of(seed: i64) -> PyResult<u32> {
+    let wrong = |_| PyValueError::new_err(format!("seed is {seed}; it is 0 to {}", u32::MAX));
+    u32::try_from(seed).map_err(wrong)
+}
+
 /// A time that is one.
 pub fn seconds(seconds: f64) -> PyResult<f64> {
     match seconds.is_finite() {
@@ -95,7 +101,8 @@ pub fn seconds(seconds: f64) -> PyResult<f64> {
     }
 }
 
-fn one_of<T>(what: &str, given: &str, words: &[(&str, T)]) -> PyResult<T>
+/// The choice that a word stands for.
+pub fn one_of<T>(what: &str, given: &str, words: &[(&str, T)]) -> PyResult<T>
 where
     T: Copy,
 {
@@ -182,10 +189,11 @@ impl Simulator {
         slf: Bound<'_, Self>,
         pose: Option<&Bound<'_, PyAny>>,
         time: Option<f64>,
-        seed: Option<u32>,
+        seed: Option<i64>,
         number: u32,
         want: Want,
     ) -> PyResult<Frame> {
+        let seed = seed.map(seed_of).transpose()?;
         let wanted = Wanted { pose: pose.map(arrays::pose).transpose()?, seed, number };
         let together = Together { time: time.map(seconds).transpose()?, kinds: want.kinds()? };
         let mut frames = Self::made(&slf, vec![wanted], together)?;
@@ -201,7 +209,7 @@ impl Simulator {
         count: u32,
         poses: Option<Vec<Bound<'_, PyAny>>>,
         time: Option<f64>,
-        seeds: Option<Vec<u32>>,
+        seeds: Option<Vec<i64>>,
         number: u32,
         want: Want,
     ) -> PyResult<Vec<Frame>> {
@@ -215,7 +223,7 @@ impl Simulator {
             let pose = poses.as_ref().map(|poses| arrays::pose(&poses[i as usize]));
             Ok(Wanted {
                 pose: pose.transpose()?,
-                seed: seeds.as_ref().map(|seeds| seeds[i as usize]),
+                seed: seeds.as_ref().map(|seeds| seed_of(seeds[i as usize])).transpose()?,
                 number: number.wrapping_add(i),
             })
         };
@@ -261,6 +269,16 @@ impl Simulator {
         let running = self.held()?.take();
         py.detach(|| drop(running));
         Ok(())
+    }
+
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        let scene = self.scene.get().__repr__(py);
+        let running = self.held()?;
+        let place = match running.as_ref() {
+            Some(running) => format!("on {}", running.device().name()),
+            None => "(closed)".to_owned(),
+        };
+        Ok(format!("<insonify.Simulator of {scene} {place}>"))
     }
 
     fn __enter__(slf: Py<Self>) -> Py<Self> {

@@ -7,6 +7,7 @@ use glam::DAffine3;
 use insonify::scene::file::{self, SceneFile};
 use insonify::scene::mesh::Surface;
 use insonify::scene::{self, Warning};
+use insonify::sim::contact::Skins;
 use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
 
@@ -55,6 +56,8 @@ pub struct State {
     /// The pose that a program gave.
     pub pose: Option<DAffine3>,
     pub time: f64,
+    /// Trees over the skin, for questions about contact.
+    pub skins: Skins,
 }
 
 impl State {
@@ -77,7 +80,27 @@ impl State {
             placed: BTreeMap::new(),
             pose: None,
             time: 0.0,
+            skins: Skins::default(),
         })
+    }
+
+    /// Returns whether both are made of the same, file and changes alike.
+    pub fn is_same(&self, other: &Self) -> bool {
+        let given = |(a, b): (&Arc<Given>, &Arc<Given>)| {
+            a.positions == b.positions
+                && a.triangles == b.triangles
+                && a.cap_openings == b.cap_openings
+        };
+        let whole = |state: &Self| std::path::absolute(state.file.path()).ok();
+        whole(self) == whole(other)
+            && self.file.text() == other.file.text()
+            && self.entries == other.entries
+            && self.given.keys().eq(other.given.keys())
+            && self.given.values().zip(other.given.values()).all(given)
+            && self.moved == other.moved
+            && self.placed == other.placed
+            && self.pose == other.pose
+            && self.time == other.time
     }
 
     /// Puts a value at a path; none takes back what was put there.
@@ -91,6 +114,7 @@ impl State {
             let (scene, warnings) = self.file.load(&entries)?;
             self.scene = scene;
             self.warnings = texts(&warnings);
+            self.skins = Skins::default();
             self.generation += 1;
         }
         self.entries = entries;

@@ -7,6 +7,8 @@ use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyList, PyString};
 
+use crate::error::SceneError;
+
 /// A value as TOML writes it: numbers, strings, booleans, sequences, and dictionaries as inline tables.
 pub fn text(value: &Bound<'_, PyAny>) -> PyResult<String> {
     if let Ok(flag) = value.cast::<PyBool>() {
@@ -20,7 +22,11 @@ pub fn text(value: &Bound<'_, PyAny>) -> PyResult<String> {
         let entries: Vec<_> = entries.iter().map(|(k, v)| format!("{} = {v}", quoted(k))).collect();
         return Ok(format!("{{ {} }}", entries.join(", ")));
     }
-    // A path is a string, an array of numpy without axes a number.
+    // Numbers and truths of numpy are those of Python.
+    if value.hasattr("dtype")? && value.getattr("ndim")?.extract::<usize>()? == 0 {
+        return text(&value.call_method0("item")?);
+    }
+    // A path is a string.
     if value.hasattr("__fspath__")? {
         let path = value.call_method0("__fspath__")?;
         return Ok(string(&path.extract::<String>()?));
@@ -29,6 +35,9 @@ pub fn text(value: &Bound<'_, PyAny>) -> PyResult<String> {
         return Ok(whole.to_string());
     }
     if let Ok(number) = value.extract::<f64>() {
+        if number.is_nan() {
+            return Err(SceneError::new_err("NaN is no value of a setting"));
+        }
         return Ok(plain(number));
     }
     if let Ok(items) = value.try_iter() {

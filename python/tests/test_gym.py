@@ -1,14 +1,18 @@
 """Environments: Gymnasium's own checks, seeds, and both kinds alike."""
 
+from contextlib import closing
+
 import numpy as np
 import pytest
 from conftest import ball
+from test_poses import body
 
 gymnasium = pytest.importorskip("gymnasium", reason="skipped: no gymnasium")
 
 from gymnasium.utils.env_checker import check_env  # noqa: E402
 
 import insonify.gym as gym  # noqa: E402
+from insonify.poses import moved  # noqa: E402
 
 SMALL = {"size": (30, 40), "start_mm": (4, 2, 0), "start_degrees": 5.0}
 
@@ -47,7 +51,7 @@ def test_the_same_seed_is_the_same_episode(env):
 
 
 def test_the_way_back_is_the_sum_of_rewards_and_ends_at_the_view(env):
-    begin = gym.moved(env._task.target, [6, 0, 0], [0, 0, 0])
+    begin = moved(env._task.target, [6, 0, 0], [0, 0, 0])
     _, info = env.reset(options={"pose": begin})
     assert np.allclose([info["distance_mm"], info["angle_degrees"]], [6, 0], atol=1e-6)
     total, reached = 0.0, False
@@ -58,16 +62,6 @@ def test_the_way_back_is_the_sum_of_rewards_and_ends_at_the_view(env):
         assert not lost
     assert abs(total - 3.0) < 1e-6 and abs(info["distance_mm"] - 3.0) < 1e-6
     assert info["tissue"].shape == (30, 40) and set(np.unique(info["tissue"])) <= {-1, 0, 1}
-
-
-def test_turns_are_those_of_the_closed_form():
-    pose = gym.moved(np.eye(4), [0, 0, 0], [0, 0, 90])
-    assert np.allclose(pose[:3, :3], [[0, -1, 0], [1, 0, 0], [0, 0, 1]], atol=1e-12)
-    assert np.allclose(gym.apart(pose, np.eye(4)), (0, 90))
-    far = np.eye(4)
-    for _ in range(1000):
-        far = gym.moved(far, [0.1, 0, 0], [1, 2, 3])
-    assert np.allclose(far[:3, :3].T @ far[:3, :3], np.eye(3), atol=1e-12)
 
 
 def test_a_vector_environment_is_its_single_ones(env):
@@ -102,3 +96,52 @@ def test_mistakes():
         gym.ReachViewVector(0, ball())
     with pytest.raises(ValueError, match="render_mode"):
         gym.ReachView(ball(), render_mode="human")
+    with pytest.raises(TypeError, match="ReachView takes no argument 'setp_mm'; it takes target"):
+        gym.ReachView(ball(), setp_mm=2)
+    env = gym.ReachView(ball(), **SMALL)
+    env.reset(seed=1)
+    for wrong in (np.full(6, np.nan), np.zeros(5)):
+        with pytest.raises(ValueError, match="six finite numbers"):
+            env.step(wrong)
+    env.close()
+
+
+def test_the_scene_stays_the_callers():
+    scene = ball()
+    before = dict(scene.items())
+    with closing(gym.ReachView(scene, **SMALL)) as env:
+        env.reset(seed=3)
+        assert dict(scene.items()) == before
+
+
+def test_on_a_skin_the_probe_slides():
+    scene = body()
+    own = np.eye(4)
+    own[2, 3] = 2.0
+    scene.pose = own
+    with closing(gym.ReachView(scene, **SMALL)) as env:
+        _, info = env.reset(seed=3)
+        for _ in range(5):
+            env.action_space.seed(1)
+            _, _, _, _, info = env.step(env.action_space.sample())
+            # The face is flat and turned about every axis: its deepest point is 2 mm below the plane z = 0.
+            half = 0.5 * scene["probe.width"]
+            high = 0.5 * scene["probe.elevation_height"]
+            corners = info["pose"] @ np.array([[i * half, j * high, 0, 1] for i in (-1, 1) for j in (-1, 1)]).T
+            assert abs(corners[2].max() - 2.0) < 0.05 and 0 < info["contact"] <= 1
+        # Lifting the probe is none of the actions.
+        lifted = env.step(np.array([0, 0, -1, 0, 0, 0], np.float32))[4]
+        assert np.allclose(lifted["pose"], info["pose"], atol=1e-3)
+    with closing(gym.ReachView(scene, skin=False, **SMALL)) as env:
+        env.reset(options={"pose": own})
+        lifted = env.step(np.array([0, 0, -1, 0, 0, 0], np.float32))[4]
+        assert np.isclose(lifted["pose"][2, 3], -1.0) and lifted["contact"] > 0.9
+
+
+def test_environments_of_forked_processes_refuse_where_they_would_wait_for_ever(capfd):
+    with closing(gym.ReachView(ball(), **SMALL)) as env:
+        env.reset(seed=1)
+        # The child ends with its exception; Gymnasium finds that it has gone.
+        with pytest.raises((OSError, EOFError)):
+            gymnasium.vector.AsyncVectorEnv([lambda: gym.ReachView(ball(), **SMALL)], context="fork")
+    assert "start it by spawn or forkserver" in capfd.readouterr().err

@@ -14,6 +14,7 @@ import pytest
 from conftest import ROOT, ball, sphere
 
 import insonify
+from insonify import _insonify
 
 
 def image(scene):
@@ -51,6 +52,37 @@ def test_a_copy_of_a_scene_has_the_same_image_and_is_its_own(again):
     other["imaging.gain"] = "0 dB"
     other.place("ball", None)
     assert scene["imaging.gain"] == 12.0 and scene.placement("ball")[0, 3] == 3
+
+
+def test_scenes_are_equal_that_are_made_of_the_same():
+    assert ball() == ball() and changed() == copy.copy(changed()) == pickle.loads(pickle.dumps(changed()))
+    assert ball() != changed() and ball() != "a scene"
+    for change in (
+        lambda s: s.__setitem__("imaging.gain", 1),
+        lambda s: s.set_vertices("ball", sphere(centre=(0, 0, 21))[0]),
+        lambda s: s.place("ball", np.eye(4)),
+        lambda s: setattr(s, "pose", np.eye(4)),
+        lambda s: setattr(s, "time", 1.0),
+    ):
+        other = ball()
+        change(other)
+        assert other != ball()
+
+
+def test_a_frame_is_pickled_with_what_was_read(simulator):
+    frame = simulator.frame(want=["iq", "labels"])
+    kept = pickle.dumps(frame)
+    other = pickle.loads(kept)
+    assert other == frame and other is not frame and copy.deepcopy(frame) is frame
+    assert (other.bmode == frame.bmode).all() and (other.iq == frame.iq).all() and other.legend == frame.legend
+    assert all(np.array_equal(other.labels[name], array, equal_nan=True) for name, array in frame.labels.items())
+    assert all(np.allclose(other.axes[name], array, atol=1e-9) for name, array in frame.axes.items())
+    assert other.probe == frame.probe and other.timings == frame.timings and (other.pose == frame.pose).all()
+    with pytest.raises(RuntimeError, match="was unpickled"):
+        other.rf
+    assert other != simulator.frame(seed=9)
+    with pytest.raises(ValueError, match="another version"):
+        _insonify.again_frame({**frame.__reduce__()[1][0], "constants": b"short"})
 
 
 def test_a_scene_of_a_file_is_pickled_with_what_was_changed():

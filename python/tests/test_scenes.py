@@ -20,6 +20,17 @@ def test_settings_are_read_and_set_as_the_manual_says(scene):
     assert "white" in scene.describe("imaging.gain")["meaning"]
 
 
+def test_a_key_has_its_default(scene):
+    for key, default in (("imaging.gain", 16.0), ("simulation.labels", False), ("probe.depth", None), ("tissues.liver.speed", None)):
+        assert scene.describe(key)["default"] == default
+    plain = insonify.Scene(background="liver", probe={"preset": "linear"})
+    defaults = {key: scene.describe(key)["default"] for key in scene.keys() if "NAME" not in key}
+    stated = {key: default for key, default in defaults.items() if default is not None and plain[key] is not None}
+    differing = {key for key, default in stated.items() if plain[key] != default}
+    # What the scene states.
+    assert len(stated) > 40 and differing == {"background", "probe.preset"}
+
+
 def test_a_scene_is_a_mapping_of_what_was_set(scene):
     assert len(scene) == 0 and list(scene) == []
     scene.update({"imaging.gain": 4, "probe.frequency": "4 MHz"})
@@ -240,3 +251,50 @@ def test_a_scene_is_saved_with_its_meshes_and_imaged_alike(tmp_path):
         scene.save(tmp_path / "placed.toml")
     with pytest.raises(insonify.SceneError, match="folder"):
         again.save(tmp_path / "nowhere" / "a.toml")
+
+
+def test_what_is_typed_wrong_is_said_in_words(scene):
+    for change, error, text in (
+        (lambda: scene.__setitem__("imaging.gain", float("nan")), insonify.SceneError, "NaN is no value"),
+        (lambda: scene.__setitem__("probe.kindx", None), KeyError, "no key `probe.kindx`"),
+        (lambda: scene.set_vertices("ball", sphere()[0] * 1e30), ValueError, "they are mm"),
+        (lambda: scene.place("ball", np.diag([-1, 1, 1, 1])), ValueError, "mirrors the mesh"),
+        (lambda: insonify.make_dataset("plan.toml", "set", shard=(-1, 2)), ValueError, "of n shards"),
+    ):
+        with pytest.raises(error, match=text):
+            change()
+    for value in (np.bool_(True), np.array(True)):
+        scene["simulation.labels"] = value
+        assert scene["simulation.labels"] is True
+    scene["imaging.gain"] = np.float32(3)
+    scene["probe.pose"] = None
+    assert scene["imaging.gain"] == 3.0
+
+
+def test_simulators_and_loops_say_what_they_are(scene):
+    with insonify.Simulator(scene, tracer="bvh") as simulator:
+        assert "'Scene()'" in repr(simulator) and simulator.device in repr(simulator)
+        loop, again = (simulator.frames(seeds=[1, 2], want=["iq"]) for _ in range(2))
+        assert loop == again and loop != simulator.frames(seeds=[1, 3], want=["iq"]) and loop != 3
+        height, width = loop.sector.shape
+        assert repr(loop) == f"<insonify.Frames 2 of {width} x {height}: bmode, iq>"
+        assert (loop.sector == simulator.frame().sector).all()
+        for seed in (-1, 2**32):
+            with pytest.raises(ValueError, match="seed is"):
+                simulator.frame(seed=seed)
+    assert repr(simulator).endswith("(closed)>")
+
+
+def test_levels_are_settings_each_cheaper_than_the_one_before():
+    scene = insonify.Scene.load(ROOT / "scenes/abdomen.toml")
+    assert scene.level(0) == {}
+    lines = [scene["probe.scanlines"]]
+    for number in range(3, 9):
+        level = scene.level(number)
+        lines.append(level["probe.scanlines"])
+        assert level["probe.elevation_layers"] < scene["probe.elevation_layers"]
+    assert lines == sorted(lines, reverse=True) and lines[-1] == 32
+    scene.update(scene.level(5))
+    assert scene["probe.scanlines"] == 96 and scene["probe.elevation_layers"] == 1
+    with pytest.raises(IndexError, match="0 to"):
+        scene.level(99)
