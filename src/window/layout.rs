@@ -113,10 +113,14 @@ fn within(ui: &mut Ui, content: impl FnOnce(&mut Ui)) {
     ui.advance_cursor_after_rect(room);
 }
 
-/// Draws the buttons of the panels, and the controls of the loop: one below the other where there is no room beside each other.
+/// Draws the buttons of the panels, and the controls of the loop: one below the other where there is no room beside
+/// each other, the buttons in as many rows as they need.
 fn bar(ui: &mut Ui, model: &mut Model, state: &mut State, now: Instant) {
-    let rows = if ui.available_width() < LOOP + toggled(ui, model, state) { 2 } else { 1 };
-    let strip = Strip::bottom("bar").resizable(false).exact_size(cine::HEIGHT * rows as f32);
+    let (room, buttons) = (ui.available_width(), toggled(ui, model, state));
+    let rows = if room < LOOP + buttons { 1 + (buttons / room).ceil() as usize } else { 1 };
+    let more = ui.spacing().interact_size.y + ui.spacing().item_spacing.y;
+    let height = cine::HEIGHT + (rows - 1) as f32 * more;
+    let strip = Strip::bottom("bar").resizable(false).exact_size(height);
     strip.show(ui, |ui| {
         within(ui, |ui| match rows {
             1 => drop(ui.horizontal_centered(|ui| {
@@ -125,8 +129,8 @@ fn bar(ui: &mut Ui, model: &mut Model, state: &mut State, now: Instant) {
                 cine::show(ui, model, &mut state.common.tools, now);
             })),
             _ => {
-                ui.add_space(6.0);
-                ui.horizontal(|ui| toggles(ui, model, state, now));
+                ui.add_space(4.0);
+                ui.horizontal_wrapped(|ui| toggles(ui, model, state, now));
                 ui.horizontal(|ui| cine::show(ui, model, &mut state.common.tools, now));
             }
         });
