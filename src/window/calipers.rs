@@ -287,7 +287,7 @@ pub(super) fn reading(reading: &Reading) -> Vec<String> {
     }
 }
 
-/// Draws the table of measurements beside the grey bar, where a sector leaves room; `bare`: without its buttons.
+/// Draws the table of measurements, at first beside the grey bar, where a sector leaves room; `bare`: without its buttons.
 pub(super) fn table(ui: &Ui, sheet: &mut Sheet, exam: Exam, frame: &Frame, bare: bool) {
     let is_measured = |what: &What| matches!(what, What::Caliper(_));
     if !sheet.marks().iter().any(|mark| is_measured(&mark.what)) {
@@ -296,27 +296,28 @@ pub(super) fn table(ui: &Ui, sheet: &mut Sheet, exam: Exam, frame: &Frame, bare:
     // In a saved picture it has a column of its own.
     let corner = ui.max_rect().left_top() + if bare { vec2(8.0, 12.0) } else { vec2(46.0, 64.0) };
     let mut removed = None;
-    Area::new(Id::new("results")).fixed_pos(corner).constrain_to(ui.max_rect()).show(
-        ui.ctx(),
-        |ui| {
-            egui::Frame::NONE
-                .fill(Color32::from_black_alpha(190))
-                .inner_margin(6)
-                .corner_radius(4)
-                .show(ui, |ui| {
-                    ui.style_mut().wrap_mode = Some(TextWrapMode::Extend);
-                    Grid::new("results")
-                        .min_col_width(0.0)
-                        .num_columns(4)
-                        .spacing([8.0, 3.0])
-                        .show(ui, |ui| {
-                            for index in 0..sheet.marks().len() {
-                                row(ui, sheet, index, (exam, bare), frame, &mut removed);
-                            }
-                        });
-                });
-        },
-    );
+    // On the screen it can be dragged aside, from the time-gain curve or from the image.
+    let area = match bare {
+        true => Area::new(Id::new("results in a picture")).fixed_pos(corner),
+        false => Area::new(Id::new("results")).default_pos(corner).movable(true),
+    };
+    area.constrain_to(ui.max_rect()).show(ui.ctx(), |ui| {
+        egui::Frame::NONE
+            .fill(Color32::from_black_alpha(190))
+            .inner_margin(6)
+            .corner_radius(4)
+            .show(ui, |ui| {
+                ui.style_mut().wrap_mode = Some(TextWrapMode::Extend);
+                Grid::new("results").min_col_width(0.0).num_columns(4).spacing([8.0, 3.0]).show(
+                    ui,
+                    |ui| {
+                        for index in 0..sheet.marks().len() {
+                            row(ui, sheet, index, (exam, bare), frame, &mut removed);
+                        }
+                    },
+                );
+            });
+    });
     if let Some(mark) = removed {
         sheet.remove(mark);
     }
