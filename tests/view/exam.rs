@@ -59,9 +59,9 @@ fn a_measured_still_has_no_buttons_and_stands_in_the_report() {
     }
 
     // Letters that are typed beside a field of the form are no keys; after a click into the image they are.
-    // Above the message about the report, which goes by itself.
+    // Above the message about the report, which goes by itself; and the image is made again where the loop stands.
     let console = [1280 - 336, 0, 336, 500];
-    let shut = desk.grab(console);
+    let shut = desk.settle(console);
     desk.click((150, 600));
     desk.press(Key::Letter('c'));
     desk.still(console);
