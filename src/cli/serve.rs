@@ -18,7 +18,7 @@ use insonify::sim;
 
 mod session;
 
-use session::Session;
+use session::{Served, Session};
 
 /// Pause where nothing has changed: a tracker sends 30 to 100 poses a second.
 const REST: Duration = Duration::from_millis(3);
@@ -85,7 +85,7 @@ fn simulate(session: &mut Session, server: &Server, args: &Serve) -> Result<()> 
     loop {
         notices.update(server);
         while let Some(request) = server.request() {
-            let outcome = session.carry_out(&request.order, server);
+            let outcome = request.order.carry_out(&mut Served { session, server });
             if outcome.is_ok() && !matches!(request.order, Order::Get(_)) {
                 shown = None;
             }

@@ -10,18 +10,19 @@ use winit::window::Window;
 
 use super::deaths::Deaths;
 use super::engine::News;
+use super::way::Way;
 use super::leaving;
 use super::link::Link;
 use super::look::{Look, Pictured};
 use super::opening::{Opened, Opening};
+use super::orders::Commands;
 use super::picture::Frame;
 use super::session::Session;
 use super::state::State;
 use super::tools::Tools;
 use super::wake::{Woken, waker};
 use super::watch::Watch;
-use super::way::Way;
-use super::{Model, Options, ViewError, acts, orders};
+use super::{Model, Options, ViewError, acts};
 use crate::gpu::Device;
 use crate::scene::Scene;
 
@@ -236,7 +237,7 @@ impl Open {
     fn keep(&mut self, now: Instant) -> Option<Instant> {
         let mut keeper = std::mem::take(&mut self.state.keeper);
         let common = &self.state.common;
-        let due = keeper.keep(&self.model, (&common.tools, common.files.with_pose), now);
+        let due = keeper.keep(&self.model, &common.tools, common.files.with_pose, now);
         self.state.keeper = keeper;
         due
     }
@@ -253,7 +254,9 @@ impl Open {
         }
         while let Some(request) = self.state.common.inputs.request() {
             let (now, mut wanted) = (Instant::now(), None);
-            let mut outcome = orders::carry_out(&request.order, &mut self.model, &mut wanted, now);
+            let model = &mut self.model;
+            let mut commands = Commands { model, wanted: &mut wanted, now };
+            let mut outcome = request.order.carry_out(&mut commands);
             if let Some(path) = wanted {
                 leaving::leave(Way::Open(path), &mut self.model, &mut self.state, now);
                 if self.state.leaving.is_some() {

@@ -5,58 +5,55 @@ use std::time::Instant;
 
 use super::error::message_of;
 use super::model::Model;
-use crate::igtl::{Order, Reach, command};
+use crate::igtl::Reach;
+use crate::igtl::command::Commanded;
 use crate::scene::file::{facts, put_settings, value_of_settings};
 
-/// Carries out the order of a client; returns the answer. A scene to be opened becomes `wanted`.
-///
-/// # Errors
-/// The fault of the order, in words; nothing has changed then.
-pub(super) fn carry_out(
-    order: &Order,
-    model: &mut Model,
-    wanted: &mut Option<PathBuf>,
-    now: Instant,
-) -> Result<String, String> {
-    match order {
-        Order::Set(pairs) => {
-            let before = model.settings.clone();
-            put_settings(pairs, &mut model.settings).map_err(|error| message_of(&error))?;
-            model.note(&before, now);
-            let told = pairs.iter().map(|(path, value)| format!("{path} = {value}"));
-            Ok(told.collect::<Vec<_>>().join("\n"))
-        }
-        Order::Get(path) => {
-            command::values(path, |key| get(model, key), || format!("`{path}` {NOT_TOLD}"))
-        }
-        Order::Time(seconds) => {
-            model.clock.seek(*seconds, now);
-            model.touch(now);
-            Ok(format!("time = {seconds} s"))
-        }
-        Order::Freeze(frozen) => {
-            model.freeze(*frozen, now);
-            Ok(if *frozen { "frozen" } else { "running" }.to_owned())
-        }
-        Order::Scene(name) => {
-            let path = Reach::of(&model.file.path).scene(name)?;
-            let told = format!("opening {}", path.display());
-            *wanted = Some(path);
-            Ok(told)
-        }
-    }
+/// The window's session as clients command it.
+pub(super) struct Commands<'m> {
+    pub(super) model: &'m mut Model,
+    /// Takes the scene that is to be opened.
+    pub(super) wanted: &'m mut Option<PathBuf>,
+    pub(super) now: Instant,
 }
 
 /// Reason why the value of a key is not in the answer.
 const NOT_TOLD: &str = "is not told by a window; `insonify serve` tells it";
 
-/// The value of a key.
-fn get(model: &Model, path: &str) -> Result<String, String> {
-    let facts = facts(path)?;
-    let value = value_of_settings(&model.settings, path);
-    let value = value.ok_or_else(|| format!("`{path}` {NOT_TOLD}"))?;
-    let text = facts.text(&value).ok_or_else(|| format!("`{path}` is not set"))?;
-    Ok(format!("{path} = {text}"))
+impl Commanded for Commands<'_> {
+    fn set(&mut self, pairs: &[(String, String)]) -> Result<(), String> {
+        let before = self.model.settings.clone();
+        put_settings(pairs, &mut self.model.settings).map_err(|error| message_of(&error))?;
+        self.model.note(&before, self.now);
+        Ok(())
+    }
+
+    fn value(&self, path: &str) -> Result<String, String> {
+        let facts = facts(path)?;
+        let value = value_of_settings(&self.model.settings, path);
+        let value = value.ok_or_else(|| self.nothing_of(path))?;
+        facts.text(&value).ok_or_else(|| format!("`{path}` is not set"))
+    }
+
+    fn nothing_of(&self, table: &str) -> String {
+        format!("`{table}` {NOT_TOLD}")
+    }
+
+    fn seek(&mut self, seconds: f64) {
+        self.model.clock.seek(seconds, self.now);
+        self.model.touch(self.now);
+    }
+
+    fn freeze(&mut self, frozen: bool) {
+        self.model.freeze(frozen, self.now);
+    }
+
+    fn open(&mut self, name: &str) -> Result<String, String> {
+        let path = Reach::of(&self.model.file.path).scene(name)?;
+        let told = format!("opening {}", path.display());
+        *self.wanted = Some(path);
+        Ok(told)
+    }
 }
 
 #[cfg(test)]
@@ -64,6 +61,7 @@ mod tests {
     use std::path::Path;
 
     use super::*;
+    use crate::igtl::Order;
     use crate::model::File;
     use crate::scene::Scene;
     use crate::sim::Tracer;
@@ -79,7 +77,8 @@ mod tests {
         let before = model.settings.clone();
         let mut told = |text: &str| {
             let order = Order::of(text).expect(text);
-            let outcome = carry_out(&order, &mut model, &mut wanted, now);
+            let mut commands = Commands { model: &mut model, wanted: &mut wanted, now };
+            let outcome = order.carry_out(&mut commands);
             (outcome, model.settings.clone(), model.frozen, wanted.clone())
         };
         let (outcome, after, ..) = told("probe.depth = 77 mm\nimaging.gain = 3");

@@ -5,7 +5,8 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use insonify::gpu::Device;
-use insonify::igtl::{Order, Reach, Server, command};
+use insonify::igtl::command::Commanded;
+use insonify::igtl::{Reach, Server};
 use insonify::scene::Scene;
 use insonify::scene::file::{self, SceneError, SceneFile};
 use insonify::sim::Simulator;
@@ -79,46 +80,13 @@ impl<'a> Session<'a> {
         self.frozen.is_some()
     }
 
-    /// Carries out the order of a client; returns the answer.
-    ///
-    /// # Errors
-    /// The fault of the order, in words; nothing has changed then.
-    pub fn carry_out(&mut self, order: &Order, server: &Server) -> Result<String, String> {
-        match order {
-            Order::Set(pairs) => self.set(pairs, server),
-            Order::Get(path) => self.get(path),
-            Order::Time(seconds) => {
-                self.clock = (Instant::now(), *seconds);
-                self.frozen = self.frozen.map(|_| *seconds);
-                Ok(format!("time = {seconds} s"))
-            }
-            Order::Freeze(frozen) => {
-                let now = self.seconds();
-                self.clock = (Instant::now(), now);
-                self.frozen = frozen.then_some(now);
-                Ok(if *frozen { "frozen" } else { "running" }.to_owned())
-            }
-            Order::Scene(name) => {
-                let path = self.reach.scene(name)?;
-                let file = SceneFile::read(&path).map_err(message_of)?;
-                self.open(&path, Vec::new(), server)?;
-                (self.path, self.file) = (path, file);
-                self.clock = (Instant::now(), 0.0);
-                self.frozen = self.frozen.map(|_| 0.0);
-                Ok(self.scene.name.clone())
-            }
-        }
-    }
-
-    fn set(&mut self, pairs: &[(String, String)], server: &Server) -> Result<String, String> {
+    fn set(&mut self, pairs: &[(String, String)], server: &Server) -> Result<(), String> {
         Reach::settings(pairs)?;
         let mut entries = self.entries.clone();
         for (path, value) in pairs {
             entries.retain(|(known, _)| known != path);
             entries.push((path.clone(), value.clone()));
         }
-        let answer = pairs.iter().map(|(path, value)| format!("{path} = {value}"));
-        let answer = answer.collect::<Vec<_>>().join("\n");
         let moves = pairs.iter().any(|(path, _)| path.starts_with("probe.pose"));
         if !pairs.iter().all(|(path, _)| SceneFile::is_light(path)) {
             let pose = self.scene.world_from_probe;
@@ -127,7 +95,7 @@ impl<'a> Session<'a> {
             if !moves {
                 self.scene.world_from_probe = pose;
             }
-            return Ok(answer);
+            return Ok(());
         }
         let mut scene = self.scene.clone();
         self.file.put(&self.all(&self.path, &entries), &mut scene).map_err(message_of)?;
@@ -140,25 +108,7 @@ impl<'a> Session<'a> {
         }
         self.simulator.fit(&scene).map_err(|error| error.to_string())?;
         (self.scene, self.entries) = (scene, entries);
-        Ok(answer)
-    }
-
-    fn get(&self, path: &str) -> Result<String, String> {
-        let none = || format!("nothing of `{path}` is set in {}", self.path.display());
-        command::values(path, |key| self.value(key), none)
-    }
-
-    /// The value of a key.
-    fn value(&self, path: &str) -> Result<String, String> {
-        let facts = file::facts(path)?;
-        let text = match file::value(&self.scene, path) {
-            Some(value) => facts.text(&value),
-            None => {
-                self.file.stated(&self.all(&self.path, &self.entries), path).map_err(message_of)?
-            }
-        };
-        let text = text.ok_or_else(|| format!("`{path}` is not set in {}", self.path.display()))?;
-        Ok(format!("{path} = {text}"))
+        Ok(())
     }
 
     /// Overrides of a scene file: those of the command line, which belong to its own file, and those of clients.
@@ -183,6 +133,54 @@ impl<'a> Session<'a> {
         server.calibrate(scene.tracker.clone());
         (self.scene, self.entries) = (scene, entries);
         Ok(())
+    }
+}
+
+/// The session as the clients of a server command it.
+pub struct Served<'s, 'a> {
+    /// The session.
+    pub session: &'s mut Session<'a>,
+    /// The server, which is told of the scene's tracker.
+    pub server: &'s Server,
+}
+
+impl Commanded for Served<'_, '_> {
+    fn set(&mut self, pairs: &[(String, String)]) -> Result<(), String> {
+        self.session.set(pairs, self.server)
+    }
+
+    fn value(&self, path: &str) -> Result<String, String> {
+        let Session { scene, file, path: place, entries, .. } = &*self.session;
+        let facts = file::facts(path)?;
+        let text = match file::value(scene, path) {
+            Some(value) => facts.text(&value),
+            None => file.stated(&self.session.all(place, entries), path).map_err(message_of)?,
+        };
+        text.ok_or_else(|| format!("`{path}` is not set in {}", place.display()))
+    }
+
+    fn nothing_of(&self, table: &str) -> String {
+        format!("nothing of `{table}` is set in {}", self.session.path.display())
+    }
+
+    fn seek(&mut self, seconds: f64) {
+        self.session.clock = (Instant::now(), seconds);
+        self.session.frozen = self.session.frozen.map(|_| seconds);
+    }
+
+    fn freeze(&mut self, frozen: bool) {
+        let now = self.session.seconds();
+        self.session.clock = (Instant::now(), now);
+        self.session.frozen = frozen.then_some(now);
+    }
+
+    fn open(&mut self, name: &str) -> Result<String, String> {
+        let path = self.session.reach.scene(name)?;
+        let file = SceneFile::read(&path).map_err(message_of)?;
+        self.session.open(&path, Vec::new(), self.server)?;
+        (self.session.path, self.session.file) = (path, file);
+        self.seek(0.0);
+        Ok(self.session.scene.name.clone())
     }
 }
 

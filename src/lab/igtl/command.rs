@@ -89,22 +89,71 @@ impl Order {
     }
 }
 
-/// The answer to `get`: the line that `value` gives of a key, or the lines of all keys of a table that have one; `none` says why
-/// there is none.
-///
-/// # Errors
-/// A key without a value, a table without any.
-pub fn values(
-    path: &str,
-    value: impl Fn(&str) -> Result<String, String>,
-    none: impl FnOnce() -> String,
-) -> Result<String, String> {
+/// A simulation that clients command.
+pub trait Commanded {
+    /// Gives keys of the scene file other values.
+    ///
+    /// # Errors
+    /// The fault of a value, in words; nothing has changed then.
+    fn set(&mut self, pairs: &[(String, String)]) -> Result<(), String>;
+
+    /// The value of a key, as a scene file writes it.
+    ///
+    /// # Errors
+    /// The reason why there is none.
+    fn value(&self, path: &str) -> Result<String, String>;
+
+    /// The reason why no key of a table has a value.
+    fn nothing_of(&self, table: &str) -> String;
+
+    /// Sets the scene's time, s.
+    fn seek(&mut self, seconds: f64);
+
+    /// Stops the image, or lets it go on.
+    fn freeze(&mut self, frozen: bool);
+
+    /// Opens another scene, by its file or its name; returns what is said of it.
+    ///
+    /// # Errors
+    /// The reason why it stays closed; the scene is then as it was.
+    fn open(&mut self, name: &str) -> Result<String, String>;
+}
+
+impl Order {
+    /// Carries the order out; returns the answer.
+    ///
+    /// # Errors
+    /// Its fault, in words; nothing has changed then.
+    pub fn carry_out(&self, on: &mut impl Commanded) -> Result<String, String> {
+        match self {
+            Self::Set(pairs) => {
+                on.set(pairs)?;
+                let lines = pairs.iter().map(|(path, value)| format!("{path} = {value}"));
+                Ok(lines.collect::<Vec<_>>().join("\n"))
+            }
+            Self::Get(path) => values(path, on),
+            Self::Time(seconds) => {
+                on.seek(*seconds);
+                Ok(format!("time = {seconds} s"))
+            }
+            Self::Freeze(frozen) => {
+                on.freeze(*frozen);
+                Ok(if *frozen { "frozen" } else { "running" }.to_owned())
+            }
+            Self::Scene(name) => on.open(name),
+        }
+    }
+}
+
+/// A line of a key and its value, or the lines of all keys of a table that have one.
+fn values(path: &str, on: &impl Commanded) -> Result<String, String> {
+    let line = |key: &str| Ok::<_, String>(format!("{key} = {}", on.value(key)?));
     let keys = keys_below(path);
     if keys.is_empty() {
-        return value(path);
+        return line(path);
     }
-    let set: Vec<String> = keys.iter().filter_map(|key| value(key).ok()).collect();
-    if set.is_empty() { Err(none()) } else { Ok(set.join("\n")) }
+    let set: Vec<String> = keys.iter().filter_map(|key| line(key).ok()).collect();
+    if set.is_empty() { Err(on.nothing_of(path)) } else { Ok(set.join("\n")) }
 }
 
 impl Request {
