@@ -4,6 +4,7 @@
 pub use insonify_base::output::*;
 
 pub mod dicom;
+pub mod film;
 pub mod movie;
 pub mod mp4;
 pub mod naming;

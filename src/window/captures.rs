@@ -17,6 +17,7 @@ use super::picture::Frame;
 use crate::exchange;
 use crate::gpu::{GpuError, Screenshot};
 use crate::output::dicom::{self, About, DicomError, Study};
+use crate::output::film::FilmError;
 use crate::output::movie::MovieError;
 use crate::output::mp4::Mp4Error;
 use crate::output::picture::grey_png;
@@ -73,6 +74,16 @@ impl CaptureError {
 impl From<MovieError> for CaptureError {
     fn from(error: MovieError) -> Self {
         Self::file(&error.path, error.cause)
+    }
+}
+
+impl From<FilmError> for CaptureError {
+    fn from(error: FilmError) -> Self {
+        match error {
+            FilmError::Gif(error) => error.into(),
+            FilmError::Mp4(error) => error.into(),
+            FilmError::Dicom(error) => error.into(),
+        }
     }
 }
 
@@ -215,7 +226,8 @@ impl Captures {
     /// Saves a report with pictures from files as `STEM-NNNN.html` in a folder, which is made where it does not exist.
     pub(super) fn report(
         &mut self,
-        (folder, stem): (PathBuf, String),
+        folder: PathBuf,
+        stem: String,
         mut report: Report,
         stills: Vec<PathBuf>,
     ) {

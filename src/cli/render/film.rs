@@ -12,11 +12,10 @@ use crate::cli::images::Images;
 use insonify::acquire::Recording;
 use insonify::exchange::{self, Format, Frames};
 use insonify::output;
-use insonify::output::dicom::{self, About, Loop};
-use insonify::output::files;
-use insonify::output::movie::Movie;
+use insonify::output::dicom::About;
 use insonify::output::mp4::Mp4;
 use insonify::output::picture::grey_png;
+use insonify::output::{files, film};
 use insonify::scene::Scene;
 use insonify::sim::Simulator;
 use insonify::sim::facts::{self, Area};
@@ -41,9 +40,7 @@ pub struct Film {
 
 enum Reel {
     Images(Images),
-    Movie(Movie),
-    Mp4(Mp4),
-    Dicom(Loop),
+    Loop(film::Film),
     Sequence(Recording),
     Exchange(Box<Frames>, Format),
 }
@@ -61,9 +58,8 @@ pub fn check(output: &Path, frames: u32) -> Result<()> {
         ));
     }
     let is_picture = ends(output, ["png", ""]);
-    let is_known =
-        is_picture || Movie::is_meant(output) || Mp4::is_meant(output) || dicom::is_meant(output);
-    if !is_known && !is_sequence(output) && Format::of(output).is_none() {
+    let is_known = is_picture || film::Film::is_meant(output) || is_sequence(output);
+    if !is_known && Format::of(output).is_none() {
         return Err(miette!(
             help = "end the name in .png (pictures), .gif (an animation), .mp4 (a film), .dcm (a loop in DICOM), .seq.mha or .seq.nrrd, \
                     .uff or .hdf5 (data)",
@@ -103,12 +99,9 @@ impl Film {
         shown: f64,
         sidecar: Map<String, Value>,
     ) -> Result<Self> {
-        let reel = if Movie::is_meant(output) {
-            Reel::Movie(Movie::new(output).into_diagnostic()?)
-        } else if Mp4::is_meant(output) {
-            Reel::Mp4(Mp4::new(output, shown))
-        } else if dicom::is_meant(output) {
-            Reel::Dicom(Loop::new(output, about(scene, simulator)))
+        let film = film::Film::of(output, shown, || about(scene, simulator));
+        let reel = if let Some(film) = film.into_diagnostic()? {
+            Reel::Loop(film)
         } else if is_sequence(output) {
             let recording = Recording::new(simulator, scene, moments.len());
             Reel::Sequence(recording.map_err(|e| {
@@ -159,17 +152,11 @@ impl Film {
                 files::replace(&path, &picture)
                     .map_err(|e| miette!("writing {}: {e}", path.display()))?;
             }
-            Reel::Movie(movie) => {
+            Reel::Loop(film) => {
                 let end = f64::from(index + 1) / self.shown;
                 frame.insert("shown_until_s".into(), json!(end));
-                movie.add(width, height, &rgba, end).into_diagnostic()?;
+                film.add([width, height], &rgba, end).into_diagnostic()?;
             }
-            Reel::Mp4(film) => {
-                let end = f64::from(index + 1) / self.shown;
-                frame.insert("shown_until_s".into(), json!(end));
-                film.add(width, height, &rgba, end).into_diagnostic()?;
-            }
-            Reel::Dicom(film) => film.add(width, height, &rgba).into_diagnostic()?,
             Reel::Sequence(recording) => {
                 let pose = self.ras_from_world * scene.world_from_probe;
                 recording.add(&rgba, self.times[index as usize], [(POSE, pose)]);
@@ -206,22 +193,13 @@ impl Film {
                 output::line(&images);
                 sidecar = Some(images.sidecar());
             }
-            Reel::Movie(movie) => {
-                movie.finish().into_diagnostic()?;
-                output::line(output.display());
-                self.sidecar.insert("file".into(), name(output));
-                sidecar = Some(output.with_extension("json"));
-            }
-            Reel::Mp4(film) => {
+            Reel::Loop(film) => {
+                // A DICOM file says all of it itself.
+                let beside = !matches!(film, film::Film::Dicom { .. });
                 film.finish().into_diagnostic()?;
                 output::line(output.display());
                 self.sidecar.insert("file".into(), name(output));
-                sidecar = Some(output.with_extension("json"));
-            }
-            Reel::Dicom(film) => {
-                film.finish(1e3 / self.shown).into_diagnostic()?;
-                output::line(output.display());
-                self.sidecar.insert("file".into(), name(output));
+                sidecar = beside.then(|| output.with_extension("json"));
             }
             Reel::Sequence(recording) => {
                 recording.finish().write(output)?;

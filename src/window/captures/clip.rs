@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use super::files::{self, Claim, scaled};
 use super::{CaptureError, Outcome, Progress, SavedStrip, Sidecar};
-use crate::output::dicom::{About, Loop};
+use crate::output::dicom::About;
+use crate::output::film::Film;
 use crate::output::movie::Movie;
 use crate::output::mp4::{self, Mp4};
 use crate::output::picture::grey_png;
@@ -39,11 +40,8 @@ pub(crate) struct Clip {
 
 /// A clip being written.
 enum Reel {
-    Gif(Movie),
-    Mp4(Mp4),
+    Film(Film),
     Sequence(PathBuf),
-    /// With the time until which each image is shown, ms from the beginning.
-    Dicom(Loop, Vec<f64>),
 }
 
 /// The largest of a clip's images, whose size all get.
@@ -62,13 +60,13 @@ impl Clip {
             Format::Dicom => claim.add(".dcm"),
         };
         let mut reel = match self.format {
-            Format::Gif => Reel::Gif(Movie::new(&target)?),
+            Format::Gif => Reel::Film(Film::Gif(Movie::new(&target)?)),
             Format::Mp4 => {
                 let ends = self.frames.iter().map(|(_, end)| *end);
-                Reel::Mp4(Mp4::new(&target, mp4::rate(ends)))
+                Reel::Film(Film::Mp4(Mp4::new(&target, mp4::rate(ends))))
             }
             Format::Sequence => Reel::Sequence(target.clone()),
-            Format::Dicom => Reel::Dicom(Loop::new(&target, self.about), Vec::new()),
+            Format::Dicom => Reel::Film(Film::dicom(&target, self.about, None)),
         };
         let [width, height, _] =
             largest(&self.frames).map_or_else(Default::default, |frame| frame.image.extent());
@@ -76,14 +74,11 @@ impl Clip {
             if progress.is_cancelled() {
                 return Ok(None);
             }
-            reel.add((index, end), &frame, [width, height])?;
+            reel.add(index, end, &frame, [width, height])?;
             progress.step();
         }
-        match reel {
-            Reel::Sequence(_) => {}
-            Reel::Gif(movie) => movie.finish()?,
-            Reel::Mp4(film) => film.finish()?,
-            Reel::Dicom(film, ends) => film.finish_at(&ends)?,
+        if let Reel::Film(film) = reel {
+            film.finish()?;
         }
         let mut sidecar = self.sidecar;
         sidecar.insert("file".into(), files::name(&target));
@@ -99,23 +94,18 @@ impl Reel {
     /// Adds an image at the size of the clip; `end` is the time until which it is shown, s from the beginning.
     fn add(
         &mut self,
-        (index, end): (usize, f64),
+        index: usize,
+        end: f64,
         frame: &Frame,
         size: [u32; 2],
     ) -> Result<(), CaptureError> {
         let rgba = frame.image.read_back()?;
         let [across, down, _] = frame.image.extent();
         let rgba = scaled(rgba, [across, down], size);
-        let [width, height] = size;
         match self {
-            Self::Gif(movie) => movie.add(width, height, &rgba, end)?,
-            Self::Mp4(film) => film.add(width, height, &rgba, end)?,
-            Self::Dicom(film, ends) => {
-                film.add(width, height, &rgba)?;
-                ends.push(1e3 * end);
-            }
+            Self::Film(film) => film.add(size, &rgba, end)?,
             Self::Sequence(folder) => {
-                let pitch = frame.sector.pitch * f64::from(down) / f64::from(height);
+                let pitch = frame.sector.pitch * f64::from(down) / f64::from(size[1]);
                 let file = folder.join(format!("{index:04}.png"));
                 files::write_new(&file, &grey_png(size, &rgba, pitch, None))?;
             }
