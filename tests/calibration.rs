@@ -4,7 +4,7 @@
 use std::f64::consts::SQRT_2;
 
 use glam::DAffine3;
-use insonify::probe::{Kind, Probe};
+use insonify::probe::{Probe, ProbeKind};
 use insonify::scene::{Instance, Keyframes, Scene, Surface, Tissue, Wire};
 use insonify::settings::ScatterMode;
 use insonify::sim::calibration::{Calibration, amplitude, lateral_taps};
@@ -308,8 +308,10 @@ fn speckle_stays_above_the_rounding_everywhere() {
 
 #[test]
 fn the_picture_holds_the_whole_sector() {
-    let wide =
-        Probe { kind: Kind::Convex { radius: 10.0, field_of_view: 4.0 }, ..Probe::paper_table1() };
+    let wide = Probe {
+        kind: ProbeKind::Convex { radius: 10.0, field_of_view: 4.0 },
+        ..Probe::paper_table1()
+    };
     for probe in [Probe::paper_table1(), Probe::abdominal(), Probe::linear(), Probe::phased(), wide]
     {
         let scene = scene(probe);
@@ -324,15 +326,15 @@ fn the_picture_holds_the_whole_sector() {
             let u = f64::from(i) / 1000.0 - 0.5;
             for depth in [0.0, scene.probe.depth] {
                 let (x, z) = match scene.probe.kind {
-                    Kind::Convex { radius, field_of_view } => {
+                    ProbeKind::Convex { radius, field_of_view } => {
                         let (s, c) = (u * field_of_view).sin_cos();
                         ((radius + depth) * s, (radius + depth) * c - radius)
                     }
-                    Kind::Phased { field_of_view } => {
+                    ProbeKind::Phased { field_of_view } => {
                         let (s, c) = (u * field_of_view).sin_cos();
                         (depth * s, depth * c)
                     }
-                    Kind::Linear { width } => (u * width, depth),
+                    ProbeKind::Linear { width } => (u * width, depth),
                 };
                 extent[0] = extent[0].min(z - f64::from(frame.image_top));
                 extent[1] = extent[1].min(f64::from(right) - x);

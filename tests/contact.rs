@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use insonify::gpu::{Device, test_device};
-use insonify::probe::Kind;
+use insonify::probe::ProbeKind;
 use insonify::scene::Scene;
 use insonify::sim::contact::{Coupling, Skins, table};
 use insonify::sim::shaders::Library;
@@ -400,9 +400,9 @@ fn shipped_scenes_are_in_full_contact_and_look_as_without_it() {
 fn every_kind_of_probe_has_a_face_as_wide_as_it_is() {
     let mut scene = rocked(0.0, 3.0);
     for (kind, width) in [
-        (Kind::Linear { width: 38.0 }, 38.0),
-        (Kind::Convex { radius: 50.0, field_of_view: 1.0 }, 50.0),
-        (Kind::Phased { field_of_view: 1.5 }, 19.0),
+        (ProbeKind::Linear { width: 38.0 }, 38.0),
+        (ProbeKind::Convex { radius: 50.0, field_of_view: 1.0 }, 50.0),
+        (ProbeKind::Phased { field_of_view: 1.5 }, 19.0),
     ] {
         scene.probe.kind = kind;
         scene.probe.aperture = 19.0;
@@ -415,7 +415,7 @@ fn every_kind_of_probe_has_a_face_as_wide_as_it_is() {
         // With the middle of the face on the skin a convex face is coupled where its edge is not higher than the
         // gel: r (1 / cos a - 1) <= gel along the beam.
         let expected = match kind {
-            Kind::Convex { radius, .. } => (2.0 * (radius / (radius + 3.0)).acos()).min(1.0),
+            ProbeKind::Convex { radius, .. } => (2.0 * (radius / (radius + 3.0)).acos()).min(1.0),
             _ => 1.0,
         };
         scene.world_from_probe = glam::DAffine3::IDENTITY;

@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_PI_4, PI, SQRT_2};
 
 use glam::{DAffine3, DQuat, DVec3};
 use insonify::gpu::test_device;
-use insonify::probe::{Kind, Probe};
+use insonify::probe::{Probe, ProbeKind};
 use insonify::scene::{Scene, Simulation};
 use insonify::sim::calibration::Calibration;
 use insonify::sim::shaders::Library;
@@ -96,7 +96,7 @@ fn speckle_is_fully_developed_and_level_at_every_depth_of_every_probe() {
         let scene = speckle(probe);
         let all = measured(&scene, 4, 8);
         // Scanlines of a small face overlap at the face.
-        let first = usize::from(!matches!(scene.probe.kind, Kind::Linear { .. }));
+        let first = usize::from(!matches!(scene.probe.kind, ProbeKind::Linear { .. }));
         for (i, [ratio, level]) in all.into_iter().enumerate().skip(first) {
             let rayleigh = (PI / (4.0 - PI)).sqrt();
             assert!((ratio - rayleigh).abs() < 0.05, "{name}, band {i}: {ratio:.3}");
@@ -162,7 +162,7 @@ fn a_moving_probe_leaves_of_speckle_what_its_beams_share() {
         samples: 1024,
         depth: 50.0,
         elevation_layers: 7,
-        kind: Kind::Linear { width: 30.0 },
+        kind: ProbeKind::Linear { width: 30.0 },
         ..Probe::paper_table1()
     };
     let scene = speckle(probe);
@@ -204,7 +204,7 @@ fn a_moving_probe_leaves_of_speckle_what_its_beams_share() {
 #[test]
 fn neighbouring_lines_share_speckle_as_their_beams_overlap() {
     let probe = Probe {
-        kind: Kind::Convex { radius: 50.0, field_of_view: FRAC_PI_4 },
+        kind: ProbeKind::Convex { radius: 50.0, field_of_view: FRAC_PI_4 },
         scanlines: 192,
         ..Probe::abdominal()
     };

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use insonify::gpu::{Binding, BufferKind, Device, Kernel, test_device};
-use insonify::probe::{Kind, Probe};
+use insonify::probe::{Probe, ProbeKind};
 use insonify::sim::layout::{Frame, KIND_CONVEX, KIND_LINEAR, KIND_PHASED};
 use insonify::sim::shaders::Library;
 use insonify::sim::tables;
@@ -22,16 +22,16 @@ fn frame(probe: &Probe) -> Frame {
         ..Frame::default()
     };
     match probe.kind {
-        Kind::Convex { radius, field_of_view } => {
+        ProbeKind::Convex { radius, field_of_view } => {
             frame.kind = KIND_CONVEX;
             frame.radius = radius as f32;
             frame.field_of_view = field_of_view as f32;
         }
-        Kind::Linear { width } => {
+        ProbeKind::Linear { width } => {
             frame.kind = KIND_LINEAR;
             frame.width = width as f32;
         }
-        Kind::Phased { field_of_view } => {
+        ProbeKind::Phased { field_of_view } => {
             frame.kind = KIND_PHASED;
             frame.field_of_view = field_of_view as f32;
         }
@@ -59,9 +59,9 @@ fn lines(device: &std::sync::Arc<Device>, probe: &Probe) -> Vec<[[f32; 4]; 4]> {
 /// The line that differs most from `Probe::ray`, and by how many tolerances.
 fn worst(lines: &[[[f32; 4]; 4]], probe: &Probe) -> f64 {
     let size = match probe.kind {
-        Kind::Convex { radius, .. } => radius,
-        Kind::Linear { width } => width,
-        Kind::Phased { .. } => 1.0,
+        ProbeKind::Convex { radius, .. } => radius,
+        ProbeKind::Linear { width } => width,
+        ProbeKind::Phased { .. } => 1.0,
     };
     let epsilon = EPSILONS * f64::from(f32::EPSILON);
     let distance = |a: [f32; 4], b: DVec3| {
@@ -104,8 +104,8 @@ fn glsl_and_rust_agree_on_every_line() {
         // A hundredth of a line pitch is noticed.
         let mut planted = probe.clone();
         match &mut planted.kind {
-            Kind::Linear { width } => *width *= 1.0 + 0.01 / 96.0,
-            Kind::Convex { field_of_view, .. } | Kind::Phased { field_of_view } => {
+            ProbeKind::Linear { width } => *width *= 1.0 + 0.01 / 96.0,
+            ProbeKind::Convex { field_of_view, .. } | ProbeKind::Phased { field_of_view } => {
                 *field_of_view *= 1.0 + 0.01 / 96.0;
             }
         }

@@ -3,7 +3,7 @@
 
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 use insonify::gpu::test_device;
-use insonify::probe::{Kind, Probe};
+use insonify::probe::{Probe, ProbeKind};
 use insonify::scene::animation::{Clock, Motion, Turn};
 use insonify::scene::graph::{Node, NodeKind};
 use insonify::scene::{Instance, Keyframes, Mesh, Scene, Surface, Tissue, shapes};
@@ -46,7 +46,7 @@ fn shoot(scene: &Scene) -> Shot {
 /// at rest and moved by `map`, which is shown; its lattice lies oblique to the beam.
 fn scene(map: impl Fn(DVec3) -> DVec3) -> Scene {
     let probe = Probe {
-        kind: Kind::Linear { width: 20.0 },
+        kind: ProbeKind::Linear { width: 20.0 },
         scanlines: 64,
         elevation_layers: 1,
         samples: 1024,

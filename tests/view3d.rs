@@ -241,7 +241,7 @@ fn the_image_lies_where_its_corners_are_seen() {
     sight.image = false;
     let without = pictures(&scene, &sight);
     let panel = DVec2::from(SIZE.map(f64::from));
-    let insonify::probe::Kind::Linear { width } = plain.probe.kind else {
+    let insonify::probe::ProbeKind::Linear { width } = plain.probe.kind else {
         unreachable!("a linear probe")
     };
     let at = |x: f64, z: f64| {

@@ -93,7 +93,7 @@ def _vector(value: ArrayLike, name: str) -> NDArray[np.float64]:
 def _matrix(value: ArrayLike) -> NDArray[np.float64]:
     out = np.asarray(value, float)
     if out.shape != (4, 4) or not np.isfinite(out).all():
-        raise ValueError(f"a pose is a matrix [4, 4] of finite numbers, not one of shape {out.shape}" if out.shape != (4, 4) else "a pose has numbers that are not finite")
+        raise ValueError(f"a pose is a matrix [4, 4] of finite numbers, not {value!r}")
     return out
 
 

@@ -24,9 +24,10 @@ PATIENCE = 0.2
 class Frames:
     """Frames of a loop: arrays of N, one for each frame.
 
-    bmode: uint8 [N, H, W]; sector: bool [H, W], true inside the sector. pose: float64 [N, 4, 4], world from probe, mm. What else was wanted stands under its name:
-    iq complex64 [N, L, K], envelope, log and rf float32 [N, L, K] (rf with more samples to a line). labels is a
-    dictionary of such arrays, legend what their numbers mean; probe are the probe's settings by their keys.
+    bmode: uint8 [N, H, W]; sector: bool [H, W], true inside it. pose: float64 [N, 4, 4], world from probe, mm. What else
+    was wanted stands under its name: iq complex64 [N, L, K], envelope, log and rf float32 [N, L, K] (rf with more samples
+    to a line). labels is a dictionary of such arrays, legend what their numbers mean; probe are the probe's settings by
+    their keys. Two are equal if their images and arrays are.
     """
 
     bmode: np.ndarray

@@ -18,7 +18,7 @@ use crate::simulator::Simulator;
 
 /// What a frame has besides its image.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Kind {
+pub enum ArrayKind {
     Iq,
     Envelope,
     Log,
@@ -26,7 +26,7 @@ pub enum Kind {
     Labels,
 }
 
-impl Kind {
+impl ArrayKind {
     /// All, by the names that Python knows.
     pub const ALL: [(&'static str, Self); 5] = [
         ("iq", Self::Iq),
@@ -69,7 +69,7 @@ pub struct Frame {
     simulator: Option<Py<Simulator>>,
     number: u64,
     picture: Picture,
-    contents: Mutex<Vec<(Kind, Contents)>>,
+    contents: Mutex<Vec<(ArrayKind, Contents)>>,
     /// Arrays that have been made of them: the next time they are the same ones.
     arrays: Mutex<Vec<(&'static str, Py<PyAny>)>>,
 }
@@ -79,7 +79,7 @@ impl Frame {
         simulator: Option<Py<Simulator>>,
         number: u64,
         picture: Picture,
-        contents: Vec<(Kind, Contents)>,
+        contents: Vec<(ArrayKind, Contents)>,
     ) -> Self {
         Self {
             simulator,
@@ -95,7 +95,7 @@ impl Frame {
     }
 
     /// What the frame has of a kind, read from the device when it is first asked for.
-    fn read(&self, py: Python<'_>, kind: Kind) -> PyResult<Contents> {
+    fn read(&self, py: Python<'_>, kind: ArrayKind) -> PyResult<Contents> {
         let all = || self.contents.lock().unwrap_or_else(PoisonError::into_inner);
         let kept = all().iter().find(|(known, _)| *known == kind).map(|(_, kept)| kept.clone());
         if let Some(kept) = kept {
@@ -136,13 +136,13 @@ impl Frame {
         Ok(made)
     }
 
-    fn array<'py>(&self, py: Python<'py>, kind: Kind) -> PyResult<Bound<'py, PyAny>> {
+    fn array<'py>(&self, py: Python<'py>, kind: ArrayKind) -> PyResult<Bound<'py, PyAny>> {
         let Contents::Rows(values, per_sample) = self.read(py, kind)? else {
             unreachable!("labels are no rows")
         };
         let frame = &self.picture.constants;
         let shape = [frame.scanlines as usize, frame.samples as usize * per_sample];
-        if kind != Kind::Iq {
+        if kind != ArrayKind::Iq {
             return shaped(py, values, &shape);
         }
         let complex = |z: &[f32]| numpy::Complex32::new(z[0], z[1]);
@@ -150,7 +150,7 @@ impl Frame {
     }
 
     fn labelled(&self, py: Python<'_>) -> PyResult<Arc<Option<(Labels, String)>>> {
-        match self.read(py, Kind::Labels)? {
+        match self.read(py, ArrayKind::Labels)? {
             Contents::Labels(labels) if labels.is_some() => Ok(labels),
             _ => Err(PyRuntimeError::new_err(
                 "this frame was made without labels: sim.frame(want=[\"labels\"]), or \
@@ -179,25 +179,25 @@ impl Frame {
     /// Complex baseband before time-gain compensation, relative to a perfect mirror [L, K].
     #[getter]
     fn iq<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.kept(py, "iq", || self.array(py, Kind::Iq))
+        self.kept(py, "iq", || self.array(py, ArrayKind::Iq))
     }
 
     /// Envelope after time-gain compensation [L, K].
     #[getter]
     fn envelope<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.kept(py, "envelope", || self.array(py, Kind::Envelope))
+        self.kept(py, "envelope", || self.array(py, ArrayKind::Envelope))
     }
 
     /// Log-compressed envelope, 0 black to 1 white [L, K].
     #[getter]
     fn log<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.kept(py, "log", || self.array(py, Kind::Log))
+        self.kept(py, "log", || self.array(py, ArrayKind::Log))
     }
 
     /// Radio-frequency lines before time-gain compensation [L, n K], n samples to each axial one.
     #[getter]
     fn rf<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.kept(py, "rf", || self.array(py, Kind::Rf))
+        self.kept(py, "rf", || self.array(py, ArrayKind::Rf))
     }
 
     /// Labels (docs/labels.md): of samples [L, K], of pixels [H, W] with `pixel_` before the name.

@@ -66,7 +66,7 @@ pub fn import_labels(
     };
     let made = || -> Result<_, FileError> {
         let name = Path::new("label array");
-        let map = LabelMap::of_voxels(name, (size, placed), voxels, &names)?;
+        let map = LabelMap::of_voxels(name, size, placed, voxels, &names)?;
         let draft = import::map::import(name, map, &folder, &options, &mut |_, _, _| {})?;
         let path = draft.finish()?;
         Ok((path, draft.told()))

@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyTuple};
 
 use crate::arrays;
-use crate::frame::{Contents, Frame, Kind, Picture};
+use crate::frame::{ArrayKind, Contents, Frame, Picture};
 use crate::save;
 
 /// Rows of a kind in a pickle: its name, their values as bytes, values for each axial sample.
@@ -38,14 +38,17 @@ pub fn kept<'py>(
     py: Python<'py>,
     number: u64,
     picture: &Picture,
-    contents: &[(Kind, Contents)],
+    contents: &[(ArrayKind, Contents)],
 ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
     let (mut rows, mut labels) = (Vec::new(), None);
     for (kind, contents) in contents {
         match contents {
             Contents::Rows(values, per_sample) => {
-                let name =
-                    Kind::ALL.iter().find(|(_, known)| known == kind).expect("all are there").0;
+                let name = ArrayKind::ALL
+                    .iter()
+                    .find(|(_, known)| known == kind)
+                    .expect("all are there")
+                    .0;
                 rows.push((
                     name.to_owned(),
                     bytemuck::cast_slice::<f32, u8>(values).to_vec(),
@@ -87,7 +90,7 @@ pub fn kept<'py>(
 pub fn again_frame(kept: Kept<'_>) -> PyResult<Frame> {
     let mut contents = Vec::new();
     for (name, bytes, per_sample) in &kept.rows {
-        let kind = Kind::ALL.iter().find(|(known, _)| known == name).ok_or_else(foreign)?.1;
+        let kind = ArrayKind::ALL.iter().find(|(known, _)| known == name).ok_or_else(foreign)?.1;
         contents.push((kind, Contents::Rows(values(bytes)?, *per_sample)));
     }
     if let Some((samples, pixels, legend)) = kept.labels {
@@ -96,7 +99,7 @@ pub fn again_frame(kept: Kept<'_>) -> PyResult<Frame> {
             Ok::<_, PyErr>(LabelGrid { shape, labels, levelled })
         };
         let labels = Labels { samples: grid(samples)?, pixels: grid(pixels)? };
-        contents.push((Kind::Labels, Contents::Labels(Arc::new(Some((labels, legend))))));
+        contents.push((ArrayKind::Labels, Contents::Labels(Arc::new(Some((labels, legend))))));
     }
     let constants = bytemuck::try_pod_read_unaligned(&kept.constants).map_err(|_| foreign())?;
     let [width, height] = kept.size;

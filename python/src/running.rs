@@ -15,7 +15,7 @@ use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
 use crate::error::{InsonifyError, raised};
-use crate::frame::{Contents, Kind, Picture};
+use crate::frame::{ArrayKind, Contents, Picture};
 use crate::state::State;
 
 /// What an image is taken with, where it is not the scene's own.
@@ -32,14 +32,14 @@ pub struct Together {
     /// Time of the scene, where it is not the scene's own.
     pub time: Option<f64>,
     /// What is read with the images; labels are then made, whatever the scene says.
-    pub kinds: Vec<Kind>,
+    pub kinds: Vec<ArrayKind>,
 }
 
 /// An image with its number among all that were made, and what was read with it.
 pub struct Taken {
     pub number: u64,
     pub picture: Picture,
-    pub contents: Vec<(Kind, Contents)>,
+    pub contents: Vec<(ArrayKind, Contents)>,
 }
 
 /// A simulator.
@@ -102,7 +102,7 @@ impl Running {
     ) -> PyResult<Vec<Taken>> {
         let own = state.scene.simulation.clone();
         state.at(together.time.unwrap_or(state.time));
-        state.scene.simulation.labels |= together.kinds.contains(&Kind::Labels);
+        state.scene.simulation.labels |= together.kinds.contains(&ArrayKind::Labels);
         if let Some(quality) = self.quality {
             let machine = sim::machine(&self.device);
             let by_hand: Vec<String> = state.by_hand().map(str::to_owned).collect();
@@ -121,7 +121,7 @@ impl Running {
         scene: &scene::Scene,
         generation: u64,
         wanted: &[Wanted],
-        kinds: &[Kind],
+        kinds: &[ArrayKind],
     ) -> PyResult<Vec<Taken>> {
         let shot = |wanted: &Wanted| sim::Shot {
             world_from_probe: wanted.pose.unwrap_or(scene.world_from_probe),
@@ -141,7 +141,8 @@ impl Running {
                 let began = Instant::now();
                 let mut picture = self.picture(scene, i, shot, passes.clone())?;
                 picture.took_ms = (each + began.elapsed()).as_secs_f64() * 1e3;
-                let read = |kind: &Kind| Ok((*kind, self.contents(number, *kind, &scene.probe)?));
+                let read =
+                    |kind: &ArrayKind| Ok((*kind, self.contents(number, *kind, &scene.probe)?));
                 let contents = kinds.iter().map(read).collect::<PyResult<_>>()?;
                 taken.push(Taken { number, picture, contents });
             }
@@ -230,7 +231,7 @@ impl Running {
     }
 
     /// What there is of image `number`, if the device still has it.
-    pub fn contents(&mut self, number: u64, kind: Kind, probe: &Probe) -> PyResult<Contents> {
+    pub fn contents(&mut self, number: u64, kind: ArrayKind, probe: &Probe) -> PyResult<Contents> {
         let first = self.images - self.held;
         let place = number.checked_sub(first + 1).filter(|place| *place < self.held);
         let (Some(place), Some(Made { simulator, .. })) = (place, self.made.as_mut()) else {
@@ -242,11 +243,13 @@ impl Running {
         simulator.choose(place as usize);
         let rows = |values| Contents::Rows(values, 1);
         let read = match kind {
-            Kind::Iq => simulator.iq().map(rows),
-            Kind::Envelope => simulator.envelope().map(rows),
-            Kind::Log => simulator.log_image().map(rows),
-            Kind::Rf => simulator.rf(probe).map(|(factor, values)| Contents::Rows(values, factor)),
-            Kind::Labels => simulator.labels().map(|labels| {
+            ArrayKind::Iq => simulator.iq().map(rows),
+            ArrayKind::Envelope => simulator.envelope().map(rows),
+            ArrayKind::Log => simulator.log_image().map(rows),
+            ArrayKind::Rf => {
+                simulator.rf(probe).map(|(factor, values)| Contents::Rows(values, factor))
+            }
+            ArrayKind::Labels => simulator.labels().map(|labels| {
                 let explained = |labels| (labels, self.legend.clone());
                 Contents::Labels(Arc::new(labels.map(explained)))
             }),

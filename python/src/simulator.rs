@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 
 use crate::arrays;
 use crate::error::{InsonifyError, raised};
-use crate::frame::{Contents, Frame, Kind};
+use crate::frame::{ArrayKind, Contents, Frame};
 use crate::process;
 use crate::running::{Running, Taken, Together, Wanted};
 use crate::scene::Scene;
@@ -67,7 +67,7 @@ impl Simulator {
         &self,
         py: Python<'_>,
         number: u64,
-        kind: Kind,
+        kind: ArrayKind,
         probe: &insonify::probe::Probe,
     ) -> PyResult<Contents> {
         let mut running = self.running()?;
@@ -143,12 +143,12 @@ enum Want {
 }
 
 impl Want {
-    fn kinds(&self) -> PyResult<Vec<Kind>> {
+    fn kinds(&self) -> PyResult<Vec<ArrayKind>> {
         let words = match self {
             Self::One(word) => std::slice::from_ref(word),
             Self::Several(words) => words,
         };
-        words.iter().map(|word| one_of("what is wanted", word, &Kind::ALL)).collect()
+        words.iter().map(|word| one_of("what is wanted", word, &ArrayKind::ALL)).collect()
     }
 }
 

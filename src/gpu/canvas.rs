@@ -34,7 +34,8 @@ pub struct PlacedImage<'a> {
 fn shown(
     [low, high]: [f32; 2],
     seen: [f32; 2],
-    (window, texels): (u32, u32),
+    window: u32,
+    texels: u32,
     flipped: bool,
 ) -> ([i32; 2], [i32; 2]) {
     let texel = (high - low) / texels as f32;
@@ -129,7 +130,8 @@ impl Commands<'_> {
     /// Draws images on black and the interface over them, on a picture that is in the state `from`; leaves it in [`DRAWN`].
     pub(super) fn draw(
         &mut self,
-        (picture, from): (vk::Image, PictureUse),
+        picture: vk::Image,
+        from: PictureUse,
         target: DrawTarget,
         images: &[PlacedImage<'_>],
         overlay: &mut Overlay,
@@ -177,7 +179,7 @@ impl Commands<'_> {
         let axis = |axis: usize, window: u32, texels: u32| {
             let sides = |r: &[f32; 4]| [r[axis], r[axis + 2]];
             let flipped = placed.flipped[axis];
-            shown(sides(&placed.to), sides(&placed.within), (window, texels), flipped)
+            shown(sides(&placed.to), sides(&placed.within), window, texels, flipped)
         };
         let (x, from_x) = axis(0, extent.width, width);
         let (y, from_y) = axis(1, extent.height, height);
@@ -281,7 +283,7 @@ pub fn picture(
     let target = (canvas.pass, canvas.framebuffer, extent);
     let general = (vk::ImageLayout::GENERAL, UNDEFINED.1, UNDEFINED.2);
     let image = &canvas.image;
-    commands.draw((image.0.handle, general), target, images, &mut overlay, &interface)?;
+    commands.draw(image.0.handle, general, target, images, &mut overlay, &interface)?;
     commands.submit()?;
     slot.wait()?;
     let mut rgba = image.read_back()?;
@@ -296,18 +298,18 @@ mod tests {
     #[test]
     fn a_part_of_an_image_is_shown_by_whole_texels() {
         // All of it; turned over.
-        assert_eq!(shown([10.0, 110.0], [0.0, 200.0], (300, 50), false), ([10, 110], [0, 50]));
-        assert_eq!(shown([10.0, 110.0], [0.0, 200.0], (300, 50), true), ([10, 110], [50, 0]));
+        assert_eq!(shown([10.0, 110.0], [0.0, 200.0], 300, 50, false), ([10, 110], [0, 50]));
+        assert_eq!(shown([10.0, 110.0], [0.0, 200.0], 300, 50, true), ([10, 110], [50, 0]));
         // Eightfold: from the texel in which the pane begins to the one in which it ends.
-        let (to, from) = shown([-300.0, 500.0], [20.0, 101.0], (300, 100), false);
+        let (to, from) = shown([-300.0, 500.0], [20.0, 101.0], 300, 100, false);
         assert_eq!((to, from), ([20, 108], [40, 51]));
-        let (to, from) = shown([-300.0, 500.0], [20.0, 101.0], (300, 100), true);
+        let (to, from) = shown([-300.0, 500.0], [20.0, 101.0], 300, 100, true);
         assert_eq!((to, from), ([20, 108], [60, 49]));
         // No farther than the window.
-        let (to, from) = shown([-301.0, 499.0], [0.0, 300.0], (300, 100), false);
+        let (to, from) = shown([-301.0, 499.0], [0.0, 300.0], 300, 100, false);
         assert_eq!((to, from), ([3, 299], [38, 75]));
         // Beside what is seen there is nothing.
-        let (to, _) = shown([400.0, 500.0], [0.0, 300.0], (300, 100), false);
+        let (to, _) = shown([400.0, 500.0], [0.0, 300.0], 300, 100, false);
         assert!(to[1] <= to[0]);
     }
 }

@@ -201,7 +201,7 @@ impl<'a> Commands<'a> {
         }
         // Commands without a scope are, for instance, uploads.
         let dispatch =
-            |this: &Self, piece| this.bind_and_dispatch((kernel, pipeline), push, &sets, piece);
+            |this: &Self, piece| this.bind_and_dispatch(kernel, pipeline, push, &sets, piece);
         let mut all = [[0; 3], groups];
         let whole = kernel.counts_groups();
         let Some(pieces) = self.slot.pieces.as_ref().filter(|_| !self.scope.is_empty()) else {
@@ -240,7 +240,8 @@ impl<'a> Commands<'a> {
 
     fn bind_and_dispatch(
         &self,
-        (kernel, pipeline): (&Kernel, vk::Pipeline),
+        kernel: &Kernel,
+        pipeline: vk::Pipeline,
         push: &[u8],
         sets: &[vk::DescriptorSet],
         [base, groups]: Groups,

@@ -98,7 +98,7 @@ impl Painter {
         let mut commands = Commands::begin(&mut self.slots[slot], self.next)?;
         commands.scope("window");
         let target = (self.pass, picture.framebuffer, extent);
-        commands.draw((image, UNDEFINED), target, images, &mut self.overlay, &interface)?;
+        commands.draw(image, UNDEFINED, target, images, &mut self.overlay, &interface)?;
         let read = match shot {
             true => {
                 let bytes = 4 * u64::from(extent.width) * u64::from(extent.height);

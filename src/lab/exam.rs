@@ -7,6 +7,6 @@ mod report;
 pub mod ventricle;
 mod worksheet;
 
-pub use packages::{Item, Kind, Quantity, annotations, items, names};
+pub use packages::{CaliperKind, Item, Quantity, annotations, items, names};
 pub use report::{Picture, Report};
 pub use worksheet::{Derived, Line, Measured, Worksheet};

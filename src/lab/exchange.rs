@@ -6,7 +6,7 @@ use glam::{DAffine3, DQuat};
 
 use crate::output::dicom::Transducer;
 use crate::output::{uff, zea};
-use crate::probe::{Kind, Probe};
+use crate::probe::{Probe, ProbeKind};
 use crate::scene::Scene;
 use crate::sim::labels::{LabelArray, LabelValues};
 use crate::sim::layout::{self, NONE};
@@ -227,9 +227,9 @@ impl Frames {
 /// Shape of the probe in the terms of DICOM.
 pub fn transducer(probe: &Probe) -> Transducer {
     match probe.kind {
-        Kind::Convex { .. } => Transducer::Curved,
-        Kind::Linear { .. } => Transducer::Linear,
-        Kind::Phased { .. } => Transducer::Phased,
+        ProbeKind::Convex { .. } => Transducer::Curved,
+        ProbeKind::Linear { .. } => Transducer::Linear,
+        ProbeKind::Phased { .. } => Transducer::Phased,
     }
 }
 
@@ -266,11 +266,13 @@ fn across(probe: &Probe) -> impl Iterator<Item = f64> {
 
 fn axes(probe: &Probe) -> uff::Axes {
     match probe.kind {
-        Kind::Linear { width } => uff::Axes::Linear(across(probe).map(|u| width * u).collect()),
-        Kind::Convex { radius, field_of_view } => {
+        ProbeKind::Linear { width } => {
+            uff::Axes::Linear(across(probe).map(|u| width * u).collect())
+        }
+        ProbeKind::Convex { radius, field_of_view } => {
             uff::Axes::Sector(radius, across(probe).map(|u| field_of_view * u).collect())
         }
-        Kind::Phased { field_of_view } => {
+        ProbeKind::Phased { field_of_view } => {
             uff::Axes::Sector(0.0, across(probe).map(|u| field_of_view * u).collect())
         }
     }
@@ -287,9 +289,9 @@ fn places(probe: &Probe, factor: u32) -> Vec<[f64; 2]> {
             ([radius * sin, radius * cos - radius], [sin, cos])
         };
         match probe.kind {
-            Kind::Linear { width } => ([width * u, 0.0], [0.0, 1.0]),
-            Kind::Convex { radius, field_of_view } => fan(radius, field_of_view),
-            Kind::Phased { field_of_view } => fan(0.0, field_of_view),
+            ProbeKind::Linear { width } => ([width * u, 0.0], [0.0, 1.0]),
+            ProbeKind::Convex { radius, field_of_view } => fan(radius, field_of_view),
+            ProbeKind::Phased { field_of_view } => fan(0.0, field_of_view),
         }
     };
     across(probe)

@@ -4,4 +4,4 @@ pub mod beam;
 pub mod face;
 mod transducer;
 
-pub use crate::settings::{Kind, MAX_ELEVATION_LAYERS, MAX_SCANLINES, Probe};
+pub use crate::settings::{MAX_ELEVATION_LAYERS, MAX_SCANLINES, Probe, ProbeKind};

@@ -27,7 +27,7 @@ pub use grey::GreyMap;
 pub(crate) use group::group;
 pub use imaging::{Imaging, Live, Machine};
 pub use key::{Facts, Form, Group, Off, Row};
-pub use probe::{Kind, MAX_ELEVATION_LAYERS, MAX_SCANLINES, Probe};
+pub use probe::{MAX_ELEVATION_LAYERS, MAX_SCANLINES, Probe, ProbeKind};
 pub use processing::Processing;
 pub use simulation::{
     Coherence, Loss, Quality, Refraction, Sampling, ScatterMode, Sequence, Simulation, TextureSpace,

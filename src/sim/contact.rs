@@ -116,7 +116,7 @@ pub(super) fn reach(scene: &Scene, width: f64) -> f64 {
 /// have the same centre.
 fn middle(scene: &Scene, line: usize) -> f64 {
     match scene.probe.kind {
-        crate::probe::Kind::Phased { .. } => 0.5 * f64::from(scene.probe.scanlines),
+        crate::probe::ProbeKind::Phased { .. } => 0.5 * f64::from(scene.probe.scanlines),
         _ => line as f64 + 0.5,
     }
 }

@@ -9,7 +9,7 @@ use super::placement::matrix_rows;
 use super::special::half_normal_coherence;
 use super::stages::expect::SPECKLE;
 use super::stages::inputs::{GREY, POINTS, ROWS, SCANLINES, SURFACES};
-use crate::probe::{Kind, Probe};
+use crate::probe::{Probe, ProbeKind};
 use crate::scene::{Scene, Surface, Wire};
 use crate::settings::{
     Coherence, Imaging, Refraction, Sampling, ScatterMode, Sequence, TextureSpace,
@@ -53,9 +53,11 @@ fn constants(
     let calibration = Calibration::new(scene);
     let (probe, simulation, imaging) = (&scene.probe, &scene.simulation, &scene.imaging);
     let (kind, radius, field_of_view, width) = match probe.kind {
-        Kind::Convex { radius, field_of_view } => (layout::KIND_CONVEX, radius, field_of_view, 0.0),
-        Kind::Linear { width } => (layout::KIND_LINEAR, 0.0, 0.0, width),
-        Kind::Phased { field_of_view } => (layout::KIND_PHASED, 0.0, field_of_view, 0.0),
+        ProbeKind::Convex { radius, field_of_view } => {
+            (layout::KIND_CONVEX, radius, field_of_view, 0.0)
+        }
+        ProbeKind::Linear { width } => (layout::KIND_LINEAR, 0.0, 0.0, width),
+        ProbeKind::Phased { field_of_view } => (layout::KIND_PHASED, 0.0, field_of_view, 0.0),
     };
     let flag = |on: bool, flag: u32| if on { flag } else { 0 };
     let ([image_width, image_height], pixel_pitch) = raster(scene);

@@ -4,13 +4,13 @@ use std::time::Instant;
 
 use egui::{Event, Key, Modifiers};
 
+use super::exit::Exit;
 use super::files::Purpose;
 use super::keys::{Action, action};
 use super::leaving;
 use super::model::{Axis, Model, Press, STEP, Source};
 use super::pads::{self, Word};
 use super::state::State;
-use super::way::Way;
 use super::{dual, help};
 use crate::settings::{Group, Imaging, Probe};
 
@@ -142,7 +142,7 @@ fn carry_out(
             state.common.open.set(&help::ROW, false);
         }
         Action::Close => drop(model.sheet.cancel()),
-        Action::Quit => leaving::leave(Way::Quit, model, state, now),
+        Action::Quit => leaving::leave(Exit::Quit, model, state, now),
     }
     model.note(&before, now);
 }

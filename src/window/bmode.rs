@@ -8,7 +8,7 @@ use super::model::Model;
 use super::picture::Frame;
 use super::place::{NARROW, Place};
 use super::{real, strip, style};
-use crate::probe::{Kind, Probe};
+use crate::probe::{Probe, ProbeKind};
 
 /// Least height of the grey bar; with less room there is none, points.
 const LEAST_BAR: f32 = 30.0;
@@ -26,7 +26,8 @@ pub(super) fn prepare(ui: &Ui, preparing: &str) {
 pub(super) fn show(
     ui: &Ui,
     area: Rect,
-    (frame, held): (&Frame, bool),
+    frame: &Frame,
+    held: bool,
     model: &Model,
     framing: &Framing,
 ) -> Option<Place> {
@@ -36,7 +37,7 @@ pub(super) fn show(
         // A window too small for any of it.
         return None;
     }
-    texts(&painter, area, (frame, held), model, framing);
+    texts(&painter, area, frame, held, model, framing);
     ruler(&painter, &place, frame);
     grey_bar(&painter, area, &place, frame);
     orientation(&painter, &place, frame);
@@ -48,15 +49,16 @@ pub(super) fn show(
 fn texts(
     painter: &egui::Painter,
     area: Rect,
-    (frame, held): (&Frame, bool),
+    frame: &Frame,
+    held: bool,
     model: &Model,
     framing: &Framing,
 ) {
     let (probe, imaging) = (&frame.probe, &frame.settings.imaging);
     let kind = match probe.kind {
-        Kind::Convex { .. } => "convex",
-        Kind::Linear { .. } => "linear",
-        Kind::Phased { .. } => "phased",
+        ProbeKind::Convex { .. } => "convex",
+        ProbeKind::Linear { .. } => "linear",
+        ProbeKind::Phased { .. } => "phased",
     };
     let mut settings = format!(
         "{kind}  {:.1} MHz  {:.0} mm  gain {:+.0} dB  range {:.0} dB",

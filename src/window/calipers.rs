@@ -9,7 +9,7 @@ use egui::{
 };
 use glam::DVec2;
 
-use super::model::calipers::{Caliper, Kind, Reading};
+use super::model::calipers::{Caliper, CaliperKind, Reading};
 use super::model::sheet::{Mark, Sheet, Tool, What};
 use super::picture::Frame;
 use super::place::Place;
@@ -30,10 +30,10 @@ const COLOURS: [Color32; 5] = [
 
 /// The keys that take tools, each for its tool.
 pub(super) const KEYS: [(Key, Tool); 5] = [
-    (Key::L, Tool::Measure(Kind::Distance)),
-    (Key::O, Tool::Measure(Kind::Ellipse)),
-    (Key::K, Tool::Measure(Kind::Angle)),
-    (Key::J, Tool::Measure(Kind::Trace)),
+    (Key::L, Tool::Measure(CaliperKind::Distance)),
+    (Key::O, Tool::Measure(CaliperKind::Ellipse)),
+    (Key::K, Tool::Measure(CaliperKind::Angle)),
+    (Key::J, Tool::Measure(CaliperKind::Trace)),
     (Key::N, Tool::Note),
 ];
 
@@ -51,10 +51,12 @@ pub(super) fn show(
     sheet: &mut Sheet,
     place: &Place,
     frame: &Frame,
-    (exam, listens, bare): (Exam, bool, bool),
+    exam: Exam,
+    listens: bool,
+    bare: bool,
 ) {
     let room = place.area.intersect(place.seen().expand(12.0));
-    pointer(ui, sheet, place, frame, (room, listens));
+    pointer(ui, sheet, place, frame, room, listens);
     let painter = ui.painter_at(place.area);
     for (index, mark) in sheet.marks().iter().enumerate() {
         let strength = if mark.of == frame.moment() { 1.0 } else { 0.45 };
@@ -124,7 +126,8 @@ fn pointer(
     sheet: &mut Sheet,
     place: &Place,
     frame: &Frame,
-    (room, listens): (Rect, bool),
+    room: Rect,
+    listens: bool,
 ) {
     let response = ui.interact(room, Id::new("image"), Sense::click_and_drag());
     let reach = f64::from(REACH) * place.mm_per_point();
@@ -216,7 +219,7 @@ fn draft(painter: &Painter, sheet: &Sheet, place: &Place) {
 fn draw(painter: &Painter, place: &Place, caliper: &Caliper, colour: Color32) {
     let points: Vec<Pos2> = caliper.points.iter().map(|&p| to_screen(place, p)).collect();
     match caliper.kind {
-        Kind::Trace => {
+        CaliperKind::Trace => {
             let outline: Vec<Pos2> = points.iter().chain(&points[..1]).copied().collect();
             dots(painter, &outline, colour);
             // A cross at each of hundreds of points would hide what is traced.
@@ -225,8 +228,8 @@ fn draw(painter: &Painter, place: &Place, caliper: &Caliper, colour: Color32) {
             }
             return;
         }
-        Kind::Distance | Kind::Angle => dots(painter, &points, colour),
-        Kind::Ellipse => {
+        CaliperKind::Distance | CaliperKind::Angle => dots(painter, &points, colour),
+        CaliperKind::Ellipse => {
             dots(painter, &points[..2], colour.gamma_multiply(0.5));
             const SIDES: u32 = 72;
             let at = |i| to_screen(place, caliper.outline(TAU * f64::from(i) / f64::from(SIDES)));
@@ -312,7 +315,7 @@ pub(super) fn table(ui: &Ui, sheet: &mut Sheet, exam: Exam, frame: &Frame, bare:
                     ui,
                     |ui| {
                         for index in 0..sheet.marks().len() {
-                            row(ui, sheet, index, (exam, bare), frame, &mut removed);
+                            row(ui, sheet, index, exam, bare, frame, &mut removed);
                         }
                     },
                 );
@@ -327,7 +330,8 @@ fn row(
     ui: &mut Ui,
     sheet: &mut Sheet,
     index: usize,
-    (exam, bare): (Exam, bool),
+    exam: Exam,
+    bare: bool,
     frame: &Frame,
     removed: &mut Option<usize>,
 ) {
@@ -354,7 +358,7 @@ fn row(
     if ui.selectable_label(is_selected, letter).on_hover_text(tip).clicked() {
         sheet.select(index);
     }
-    named(ui, sheet, index, (exam, kind), name);
+    named(ui, sheet, index, exam, kind, name);
     values(ui, lines, stands);
     if ui.small_button("x").on_hover_text("Remove (Del)").clicked() {
         *removed = Some(index);
@@ -373,7 +377,14 @@ fn values(ui: &mut Ui, lines: Vec<String>, stands: bool) {
 }
 
 /// Draws the name of a measurement, which is chosen or typed.
-fn named(ui: &mut Ui, sheet: &mut Sheet, index: usize, (exam, kind): (Exam, Kind), name: String) {
+fn named(
+    ui: &mut Ui,
+    sheet: &mut Sheet,
+    index: usize,
+    exam: Exam,
+    kind: CaliperKind,
+    name: String,
+) {
     let shown = if name.is_empty() { kind.name() } else { name.as_str() };
     let button = ui.menu_button(RichText::new(shown).size(12.0), |ui| {
         ui.set_max_width(120.0);

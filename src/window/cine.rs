@@ -79,7 +79,7 @@ fn player(ui: &mut Ui, cine: &mut Cine<Frame>, format: &mut Format, now: Instant
 
 fn speed(ui: &mut Ui, cine: &mut Cine<Frame>, now: Instant) {
     let mut speed = cine.speed();
-    style::choice(ui, ("speed", 58.0), &mut speed, &SPEEDS, |speed| format!("x {speed}"))
+    style::choice(ui, "speed", 58.0, &mut speed, &SPEEDS, |speed| format!("x {speed}"))
         .on_hover_text("How fast the loop plays; 1 is the pace at which it was imaged");
     if speed != cine.speed() {
         cine.set_speed(speed, now);
@@ -96,7 +96,7 @@ fn choose(ui: &mut Ui, format: &mut Format) {
     let tip = "How a clip is saved (F3): an animated GIF, an MP4 film (the program ffmpeg makes it), a folder of PNG \
                files, or DICOM; with DICOM chosen, a still (F2) is saved as DICOM beside its PNG, too";
     let all = [Format::Gif, Format::Mp4, Format::Sequence, Format::Dicom];
-    style::choice(ui, ("format", 56.0), format, &all, name).on_hover_text(tip);
+    style::choice(ui, "format", 56.0, format, &all, name).on_hover_text(tip);
 }
 
 /// The track: one place per image; a drag looks through them.

@@ -78,12 +78,13 @@ impl Dual {
     pub(super) fn show(
         &mut self,
         ui: &mut Ui,
-        (area, bare): (Rect, bool),
+        area: Rect,
+        bare: bool,
         model: &Model,
         framing: &Framing,
     ) -> Option<Place> {
         let held = self.held.as_ref()?;
-        let place = bmode::show(ui, area, (&held.frame, true), model, framing)?;
+        let place = bmode::show(ui, area, &held.frame, true, model, framing)?;
         calipers::show_held(ui, &held.marks, &place);
         if !bare {
             let corner = pos2(area.right() - 82.0, area.top() + 9.0);

@@ -21,7 +21,8 @@ const COLOUR: Color32 = Color32::from_rgb(90, 220, 120);
 pub(super) fn show(
     ui: &Ui,
     place: &Place,
-    (frame, newest): (&Frame, Option<f64>),
+    frame: &Frame,
+    newest: Option<f64>,
     beat: Option<Clock>,
 ) {
     let Some(beat) = beat.filter(|_| place.room.height() > LEAST) else { return };

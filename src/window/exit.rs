@@ -1,10 +1,10 @@
-//! Ways out of a session.
+//! Exits: ways out of what is there, by which unsaved work may be lost.
 
 use std::path::PathBuf;
 
 /// Something by which unsaved work would be lost.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Way {
+pub(super) enum Exit {
     /// The window is closed.
     Quit,
     /// Another scene is opened, or the same from its beginning.
@@ -15,15 +15,15 @@ pub(super) enum Way {
     LoadTrajectory,
 }
 
-/// A way out, and how far it has come.
+/// An exit on its way, and how far it has come.
 pub(super) struct Leaving {
-    pub(super) way: Way,
+    pub(super) exit: Exit,
     pub(super) stage: Stage,
     /// The reason why something was not saved.
     pub(super) problem: Option<String>,
 }
 
-/// How far a way out has come.
+/// How far an exit has come.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Stage {
     /// The question has not been drawn yet.

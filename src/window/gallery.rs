@@ -6,8 +6,8 @@ use egui::{
     Align2, Context, Id, Image, Key, RichText, Sense, TextureHandle, TextureOptions, Ui, vec2,
 };
 
+use super::exit::Exit;
 use super::panel::{Ask, Desk, Dock, Panel, Row};
-use super::way::Way;
 use super::{recent, style};
 use crate::scene::shipped::{self, SCENES, Shipped};
 
@@ -80,7 +80,7 @@ impl Panel for Gallery {
             Ok(path) => {
                 *self = Self::default();
                 desk.common.open.set(&ROW, false);
-                desk.common.asks.push(Ask::Leave(Way::Open(path)));
+                desk.common.asks.push(Ask::Leave(Exit::Open(path)));
             }
             Err(error) => self.problem = Some(error.to_string()),
         }

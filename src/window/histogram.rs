@@ -6,7 +6,7 @@ use std::time::Instant;
 use egui::{Align2, FontId, Grid, Key, Pos2, Rect, ScrollArea, Sense, Ui, vec2};
 use glam::{DVec2, dvec2};
 
-use super::model::calipers::{Caliper, Kind};
+use super::model::calipers::{Caliper, CaliperKind};
 use super::model::sheet::What;
 use super::panel::{Desk, Dock, Panel, Row};
 use super::picture::Frame;
@@ -113,13 +113,13 @@ impl Region {
 fn encloses(caliper: &Caliper, point: DVec2) -> Option<bool> {
     let p = &caliper.points;
     match caliper.kind {
-        Kind::Distance | Kind::Angle => None,
-        Kind::Ellipse => {
+        CaliperKind::Distance | CaliperKind::Angle => None,
+        CaliperKind::Ellipse => {
             let middle = (p[0] + p[1]) / 2.0;
             let along = |axis: DVec2| (point - middle).dot(axis) / axis.length_squared();
             Some(along(p[0] - middle).powi(2) + along(p[2] - middle).powi(2) <= 1.0)
         }
-        Kind::Trace => {
+        CaliperKind::Trace => {
             let sides = p.iter().zip(p.iter().cycle().skip(1));
             let crossed = sides.filter(|(a, b)| {
                 (a.y > point.y) != (b.y > point.y)
@@ -281,11 +281,11 @@ mod tests {
     #[test]
     fn regions_are_what_is_drawn_around_and_transparent_pixels_are_none() {
         let ellipse = Caliper::new(
-            Kind::Ellipse,
+            CaliperKind::Ellipse,
             vec![dvec2(10.0, 20.0), dvec2(30.0, 20.0), dvec2(20.0, 25.0)],
         );
         let trace = Caliper::new(
-            Kind::Trace,
+            CaliperKind::Trace,
             vec![dvec2(0.0, 0.0), dvec2(40.0, 0.0), dvec2(40.0, 30.0), dvec2(20.0, 10.0)],
         );
         let mut rgba = row((0..60 * 50).map(|_| 7));
@@ -294,7 +294,7 @@ mod tests {
         };
         assert!((f64::from(count(&rgba, &ellipse)) - 50.0 * PI).abs() < 5.0);
         assert!((f64::from(count(&rgba, &trace)) - 500.0).abs() < 20.0);
-        let line = Caliper::new(Kind::Distance, vec![DVec2::ZERO, DVec2::ONE]);
+        let line = Caliper::new(CaliperKind::Distance, vec![DVec2::ZERO, DVec2::ONE]);
         assert_eq!(encloses(&line, DVec2::ZERO), None);
         rgba.iter_mut().skip(3).step_by(4).for_each(|alpha| *alpha = 0);
         assert_eq!(count(&rgba, &ellipse), 0);

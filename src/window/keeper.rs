@@ -119,7 +119,8 @@ impl Keeper {
     pub(super) fn keep(
         &mut self,
         model: &Model,
-        (tools, with_pose): (&Tools, bool),
+        tools: &Tools,
+        with_pose: bool,
         now: Instant,
     ) -> Option<Instant> {
         let unsaved = Unsaved::of_all(model, tools, with_pose);

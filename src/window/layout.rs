@@ -240,8 +240,8 @@ fn windows(ui: &mut Ui, model: &mut Model, state: &mut State, seen: Seen<'_>) {
         _ if state.offer.is_some() => offer::show(ui.ctx(), state),
         true => leaving::show(ui.ctx(), model, state, seen.now),
         false => {
-            let way = files::dialog(ui.ctx(), model, &mut state.common.files, seen.now);
-            state.common.asks.extend(way.map(Ask::Leave));
+            let exit = files::dialog(ui.ctx(), model, &mut state.common.files, seen.now);
+            state.common.asks.extend(exit.map(Ask::Leave));
         }
     }
     each(model, state, seen, |panel, desk| {
@@ -251,7 +251,7 @@ fn windows(ui: &mut Ui, model: &mut Model, state: &mut State, seen: Seen<'_>) {
     });
     for ask in std::mem::take(&mut state.common.asks) {
         match ask {
-            Ask::Leave(way) => leaving::leave(way, model, state, seen.now),
+            Ask::Leave(exit) => leaving::leave(exit, model, state, seen.now),
             Ask::Record => leaving::record(model, state, seen.now),
         }
     }
@@ -266,9 +266,9 @@ fn images(
 ) -> (Option<Place>, Option<Place>) {
     let Seen { frame, now, .. } = seen;
     let [room, beside] = state.dual.rooms(ui.max_rect());
-    let held = state.dual.show(ui, (beside, false), model, &state.framing);
+    let held = state.dual.show(ui, beside, false, model, &state.framing);
     let place = match frame {
-        Some(frame) => bmode::show(ui, room, (frame, false), model, &state.framing),
+        Some(frame) => bmode::show(ui, room, frame, false, model, &state.framing),
         None => {
             bmode::prepare(ui, state.preparing);
             None
@@ -278,9 +278,9 @@ fn images(
     let sheet = &mut model.sheet;
     let kind = model.settings.imaging.exam;
     if let (Some(place), Some(frame)) = (&place, frame) {
-        calipers::show(ui, sheet, place, frame, (kind, listens, false));
+        calipers::show(ui, sheet, place, frame, kind, listens, false);
         let newest = state.common.tools.cine.newest().map(|newest| newest.seconds);
-        ecg::show(ui, place, (frame, newest), model.beat.filter(|_| kind == Exam::Cardiac));
+        ecg::show(ui, place, frame, newest, model.beat.filter(|_| kind == Exam::Cardiac));
         state.framing.follow(ui, place);
         if let Some(at) = calipers::asked(ui, place) {
             let mm = place.mm(at);
@@ -288,8 +288,8 @@ fn images(
             state.naming.asked = Some((at, naming::Question::Place(point)));
         }
         calipers::table(ui, sheet, kind, frame, false);
-        let mark = (&mut model.body, kind, state.dual.is_on());
-        if strip::show(ui, &mut state.common.tools, sheet, mark) {
+        let (tools, dual) = (&mut state.common.tools, state.dual.is_on());
+        if strip::show(ui, tools, sheet, &mut model.body, kind, dual) {
             dual::hold(model, &mut state.dual, &state.common.tools, now);
         }
         if let Some(mark) = &mut model.body {

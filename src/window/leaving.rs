@@ -5,11 +5,11 @@ use std::time::Instant;
 
 use egui::{Key, Modifiers, RichText, Ui};
 
+use super::exit::{Exit, Leaving, Stage};
 use super::model::Model;
 use super::state::State;
 use super::style::{self, button};
 use super::unsaved::Unsaved;
-use super::way::{Leaving, Stage, Way};
 use crate::scene::shipped;
 
 /// Width of the question, points.
@@ -22,7 +22,7 @@ fn lines(unsaved: &Unsaved, model: &Model, state: &State) -> Vec<String> {
         true => format!("Settings: into a file of your own, as {scene} ships"),
         false => format!("Settings: into {scene}"),
     });
-    let way = unsaved.trajectory.then(|| {
+    let recorded = unsaved.trajectory.then(|| {
         let seconds = match (&model.trajectory.recorder, model.unsaved_trajectory()) {
             (Some(recorder), _) => recorder.seconds(Instant::now()),
             (None, stored) => stored.map_or(0.0, |stored| stored.seconds()),
@@ -34,7 +34,7 @@ fn lines(unsaved: &Unsaved, model: &Model, state: &State) -> Vec<String> {
         let folder = state.common.tools.folder.display();
         format!("Measurements and texts, {}: with the image, in {folder}", unsaved.marks)
     });
-    settings.into_iter().chain(way).chain(marks).collect()
+    settings.into_iter().chain(recorded).chain(marks).collect()
 }
 
 fn name(path: &Path) -> String {
@@ -42,20 +42,20 @@ fn name(path: &Path) -> String {
 }
 
 /// Goes a way out, or asks first where it would lose something.
-pub(super) fn leave(way: Way, model: &mut Model, state: &mut State, now: Instant) {
+pub(super) fn leave(exit: Exit, model: &mut Model, state: &mut State, now: Instant) {
     if state.leaving.is_some() {
         return;
     }
-    match Unsaved::of(&way, model, &state.common.tools, state.common.files.with_pose).is_empty() {
-        true => go(way, model, state, now),
-        false => state.leaving = Some(Leaving { way, stage: Stage::Begins, problem: None }),
+    match Unsaved::of(&exit, model, &state.common.tools, state.common.files.with_pose).is_empty() {
+        true => go(exit, model, state, now),
+        false => state.leaving = Some(Leaving { exit, stage: Stage::Begins, problem: None }),
     }
 }
 
 /// Begins a recording, or ends it. One that is not saved is asked about before the next begins.
 pub(super) fn record(model: &mut Model, state: &mut State, now: Instant) {
     if model.trajectory.recorder.is_none() {
-        return leave(Way::Record, model, state, now);
+        return leave(Exit::Record, model, state, now);
     }
     model.record(now);
     if let Some(stored) = model.unsaved_trajectory() {
@@ -64,12 +64,12 @@ pub(super) fn record(model: &mut Model, state: &mut State, now: Instant) {
     }
 }
 
-fn go(way: Way, model: &mut Model, state: &mut State, now: Instant) {
-    match way {
-        Way::Quit => state.quit = true,
-        Way::Open(path) => state.common.files.wanted = Some(path),
-        Way::Record => model.record(now),
-        Way::LoadTrajectory => state.common.inputs.load(model, now),
+fn go(exit: Exit, model: &mut Model, state: &mut State, now: Instant) {
+    match exit {
+        Exit::Quit => state.quit = true,
+        Exit::Open(path) => state.common.files.wanted = Some(path),
+        Exit::Record => model.record(now),
+        Exit::LoadTrajectory => state.common.inputs.load(model, now),
     }
 }
 
@@ -90,7 +90,7 @@ pub(super) fn show(ctx: &egui::Context, model: &mut Model, state: &mut State, no
             state.common.tools.collect();
             // The reason is said over the bar, with another folder to choose.
             if !state.common.tools.notices.has_failed() {
-                go(leaving.way, model, state, now);
+                go(leaving.exit, model, state, now);
             }
         }
     }
@@ -112,7 +112,7 @@ fn ask(
     now: Instant,
 ) {
     let unsaved =
-        Unsaved::of(&leaving.way, model, &state.common.tools, state.common.files.with_pose);
+        Unsaved::of(&leaving.exit, model, &state.common.tools, state.common.files.with_pose);
     let lines = lines(&unsaved, model, state);
     let fresh = leaving.stage == Stage::Begins;
     leaving.stage = Stage::Asks;
@@ -129,12 +129,12 @@ fn ask(
     });
     match shown.and_then(|shown| shown.inner).flatten() {
         Some(Answer::Cancel) => {}
-        Some(Answer::Discard) => go(leaving.way, model, state, now),
+        Some(Answer::Discard) => go(leaving.exit, model, state, now),
         Some(Answer::Save) => {
             match save(&unsaved, model, state, now) {
                 Ok(false) => return,
                 Ok(true) if unsaved.marks > 0 => leaving.stage = Stage::Draws,
-                Ok(true) => return go(leaving.way, model, state, now),
+                Ok(true) => return go(leaving.exit, model, state, now),
                 Err(problem) => leaving.problem = Some(problem),
             }
             state.leaving = Some(leaving);

@@ -182,15 +182,15 @@ impl Panel for Lesson {
             }
             lesson.chosen = lesson.chosen.min(model.tasks.len() - 1);
             if let Some(page) = &mut lesson.page {
-                let of = (model.title.as_str(), model.tasks[lesson.chosen].name.as_str());
-                if !history::show(ui, page, of) {
+                let task = &model.tasks[lesson.chosen].name;
+                if !history::show(ui, page, &model.title, task) {
                     lesson.page = None;
                 }
                 return;
             }
             match lesson.run.is_some() {
                 false => before(ui, model, lesson, now),
-                true => during(ui, model, (lesson, &common.wake), now),
+                true => during(ui, model, lesson, &common.wake, now),
             }
             if lesson.marking.is_some() {
                 ui.label("Scoring ...");
@@ -215,7 +215,7 @@ fn before(ui: &mut Ui, model: &mut Model, lesson: &mut Lesson, now: Instant) {
     let all: Vec<usize> = (0..model.tasks.len()).collect();
     let was = lesson.chosen;
     let name = |index: usize| model.tasks[index].name.clone();
-    style::choice(ui, ("task", WIDTH - 12.0), &mut lesson.chosen, &all, name);
+    style::choice(ui, "task", WIDTH - 12.0, &mut lesson.chosen, &all, name);
     if was != lesson.chosen {
         (lesson.result, lesson.problem) = (None, None);
     }
@@ -275,7 +275,7 @@ fn start(model: &mut Model, lesson: &mut Lesson, now: Instant) {
 }
 
 /// What is to be done, the guide, and the way to hand it in.
-fn during(ui: &mut Ui, model: &mut Model, (lesson, wake): (&mut Lesson, &Wake), now: Instant) {
+fn during(ui: &mut Ui, model: &mut Model, lesson: &mut Lesson, wake: &Wake, now: Instant) {
     let task = model.tasks[lesson.chosen].clone();
     ui.label(RichText::new(&task.name).strong());
     ui.label(&task.text);

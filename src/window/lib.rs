@@ -25,6 +25,7 @@ mod ecg;
 pub mod engine;
 mod error;
 mod exam;
+mod exit;
 mod files;
 mod framing;
 mod gallery;
@@ -71,7 +72,6 @@ mod unsaved;
 mod view3d;
 mod wake;
 mod watch;
-mod way;
 
 use winit::event_loop::EventLoop;
 

@@ -112,10 +112,10 @@ fn draw(
     let mut within = ui.new_child(UiBuilder::new().max_rect(parts.images));
     let ui = &mut within;
     let [room, beside] = state.dual.rooms(parts.images);
-    let held = state.dual.show(ui, (beside, true), model, &state.framing);
-    let own = bmode::show(ui, room, (frame, false), model, &state.framing);
+    let held = state.dual.show(ui, beside, true, model, &state.framing);
+    let own = bmode::show(ui, room, frame, false, model, &state.framing);
     if let Some(place) = &own {
-        calipers::show(ui, &mut sheet, place, frame, (kind, false, true));
+        calipers::show(ui, &mut sheet, place, frame, kind, false, true);
         if let Some(mark) = &mut model.body {
             body::show(ui, mark, true);
         }
@@ -127,7 +127,7 @@ fn draw(
     let below = ui.new_child(UiBuilder::new().max_rect(below));
     let newest = state.common.tools.cine.newest().map(|newest| newest.seconds);
     if let (Some(place), Exam::Cardiac) = (&own, kind) {
-        ecg::show(&below, place, (frame, newest), model.beat);
+        ecg::show(&below, place, frame, newest, model.beat);
     }
     let column = ui.new_child(UiBuilder::new().max_rect(parts.table));
     calipers::table(&column, &mut sheet, kind, frame, true);

@@ -221,7 +221,7 @@ fn line(ui: &mut Ui, strip: &mut Strip, probe: &Probe) {
 fn width(ui: &mut Ui, panel: &mut MmodePanel) {
     ui.horizontal(|ui| {
         ui.label("Width");
-        style::choice(ui, ("width", 60.0), &mut panel.window, &WINDOWS, |s| format!("{s} s"))
+        style::choice(ui, "width", 60.0, &mut panel.window, &WINDOWS, |s| format!("{s} s"))
             .on_hover_text("Time across the strip, s");
     });
 }

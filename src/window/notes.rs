@@ -33,7 +33,7 @@ pub(super) fn editor(ui: &Ui, sheet: &mut Sheet, place: &Place, exam: Exam) {
     let Some(index) = sheet.editing() else { return };
     if let What::Note(note) = &sheet.marks()[index].what {
         let (text, at) = (note.text.clone(), to_screen(place, note.at));
-        field(ui.ctx(), sheet, index, (text, exam), at);
+        field(ui.ctx(), sheet, index, text, exam, at);
     }
 }
 
@@ -42,7 +42,8 @@ fn field(
     context: &Context,
     sheet: &mut Sheet,
     index: usize,
-    (mut text, exam): (String, Exam),
+    mut text: String,
+    exam: Exam,
     at: Pos2,
 ) {
     let id = Id::new(("note", index));
@@ -115,7 +116,7 @@ mod tests {
                     panic!("a note is edited");
                 };
                 let text = note.text.clone();
-                field(ui.ctx(), &mut sheet, index, (text, Exam::Cardiac), pos2(50.0, 50.0));
+                field(ui.ctx(), &mut sheet, index, text, Exam::Cardiac, pos2(50.0, 50.0));
             });
             output.textures_delta.clear();
         };

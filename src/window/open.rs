@@ -10,7 +10,7 @@ use winit::window::Window;
 
 use super::deaths::Deaths;
 use super::engine::News;
-use super::way::Way;
+use super::exit::Exit;
 use super::leaving;
 use super::link::Link;
 use super::look::{Look, Pictured};
@@ -258,7 +258,7 @@ impl Open {
             let mut commands = Commands { model, wanted: &mut wanted, now };
             let mut outcome = request.order.carry_out(&mut commands);
             if let Some(path) = wanted {
-                leaving::leave(Way::Open(path), &mut self.model, &mut self.state, now);
+                leaving::leave(Exit::Open(path), &mut self.model, &mut self.state, now);
                 if self.state.leaving.is_some() {
                     outcome = Ok(ASKED.to_owned());
                 }
@@ -292,7 +292,7 @@ impl Open {
 
     /// The user wants to close the window: asks first what becomes of unsaved work.
     pub(super) fn leave(&mut self) {
-        leaving::leave(Way::Quit, &mut self.model, &mut self.state, Instant::now());
+        leaving::leave(Exit::Quit, &mut self.model, &mut self.state, Instant::now());
         self.window.request_redraw();
     }
 

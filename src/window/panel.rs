@@ -7,6 +7,7 @@ use std::time::Instant;
 
 use egui::{Context, Key, Ui};
 
+use super::exit::Exit;
 use super::files::Files;
 use super::inputs::Inputs;
 use super::look::Pictured;
@@ -15,7 +16,6 @@ use super::picture::Frame;
 use super::statistics::Times;
 use super::tools::Tools;
 use super::wake::Wake;
-use super::way::Way;
 use crate::settings::Machine;
 
 /// Where a panel is drawn.
@@ -129,7 +129,7 @@ impl OpenPanels {
 /// What panels ask of the window, carried out when all of them are drawn.
 pub(super) enum Ask {
     /// A way out of what is there, which may lose unsaved work.
-    Leave(Way),
+    Leave(Exit),
     /// The recording of the probe's way begins or ends.
     Record,
 }

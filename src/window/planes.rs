@@ -101,10 +101,10 @@ impl Panel for Planes {
                 *picture = Some(make(ui, plane, &registration, key));
             }
             if let Some(picture) = picture {
-                draw(&ui.painter_at(rect), rect, plane, picture, (&registration, pitch));
+                draw(&ui.painter_at(rect), rect, plane, picture, &registration, pitch);
             }
             let response = ui.interact(rect, ui.id().with(plane.name), Sense::click_and_drag());
-            act(ui, &response, rect, plane, (&mut registration, &mut model.settings), pitch);
+            act(ui, &response, rect, plane, &mut registration, &mut model.settings, pitch);
         }
         model.registration = Some(registration);
         model.note(&before, now);
@@ -154,7 +154,8 @@ fn draw(
     rect: Rect,
     plane: &Plane,
     picture: &Picture,
-    (registration, pitch): (&Registration, f64),
+    registration: &Registration,
+    pitch: f64,
 ) {
     let whole = Rect::from_min_max(Pos2::ZERO, pos2(1.0, 1.0));
     painter.image(picture.texture.id(), rect, whole, Color32::WHITE);
@@ -185,7 +186,8 @@ fn act(
     response: &Response,
     rect: Rect,
     plane: &Plane,
-    (registration, settings): (&mut Registration, &mut Settings),
+    registration: &mut Registration,
+    settings: &mut Settings,
     pitch: f64,
 ) {
     let [right, down] = plane.axes;

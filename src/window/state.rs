@@ -2,12 +2,12 @@
 
 use super::deaths::Deaths;
 use super::dual::Dual;
+use super::exit::Leaving;
 use super::framing::Framing;
 use super::keeper::{Keeper, Orphan};
 use super::naming::Naming;
 use super::panel::Common;
 use super::panels::Panels;
-use super::way::Leaving;
 
 /// State of the window itself.
 pub(super) struct State {

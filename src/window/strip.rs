@@ -10,7 +10,7 @@ use super::body;
 use super::calipers::{cross, dots};
 use super::model;
 use super::model::body::BodyMark;
-use super::model::calipers::Kind;
+use super::model::calipers::CaliperKind;
 use super::model::sheet::{Sheet, Tool};
 use super::tools::Tools;
 use crate::settings::Exam;
@@ -28,13 +28,13 @@ type Icon = fn(&Painter, Rect, Color32);
 
 /// The tools of the pointer: sign and meaning.
 const TOOLS: [(Tool, &str, Icon); 5] = [
-    (Tool::Measure(Kind::Distance), "Distance in mm: two clicks, or drag (L)", |p, r, c| {
+    (Tool::Measure(CaliperKind::Distance), "Distance in mm: two clicks, or drag (L)", |p, r, c| {
         dots(p, &[r.left_bottom(), r.right_top()], c);
         cross(p, r.left_bottom(), c);
         cross(p, r.right_top(), c);
     }),
     (
-        Tool::Measure(Kind::Ellipse),
+        Tool::Measure(CaliperKind::Ellipse),
         "Ellipse, its circumference and area: the ends of one axis, then the width (O)",
         |p, r, c| {
             let radius = vec2(r.width() * 0.62, r.height() * 0.42);
@@ -43,7 +43,7 @@ const TOOLS: [(Tool, &str, Icon); 5] = [
         },
     ),
     (
-        Tool::Measure(Kind::Angle),
+        Tool::Measure(CaliperKind::Angle),
         "Angle in degrees: a point on one arm, the vertex, a point on the other (K)",
         |p, r, c| {
             let line = Stroke::new(1.5, c);
@@ -52,7 +52,7 @@ const TOOLS: [(Tool, &str, Icon); 5] = [
         },
     ),
     (
-        Tool::Measure(Kind::Trace),
+        Tool::Measure(CaliperKind::Trace),
         "Trace, its circumference and area: draw it, or click along it and then on its beginning (J)",
         |p, r, c| {
             let side = |x: f32, y: f32| r.center() + vec2(x * r.width(), y * r.height());
@@ -118,7 +118,9 @@ pub(super) fn show(
     ui: &mut Ui,
     tools: &mut Tools,
     sheet: &mut Sheet,
-    (mark, exam, dual): (&mut Option<BodyMark>, Exam, bool),
+    mark: &mut Option<BodyMark>,
+    exam: Exam,
+    dual: bool,
 ) -> bool {
     let area = ui.max_rect();
     if top(area) < area.top() + TEXTS {

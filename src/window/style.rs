@@ -45,7 +45,8 @@ pub(super) fn button(ui: &mut Ui, word: &str, tip: impl Into<WidgetText>) -> boo
 /// A list to choose a value from.
 pub(super) fn choice<T: Copy + PartialEq>(
     ui: &mut Ui,
-    (id, width): (&str, f32),
+    id: &str,
+    width: f32,
     value: &mut T,
     all: &[T],
     name: impl Fn(T) -> String,

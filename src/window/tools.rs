@@ -319,7 +319,7 @@ impl Tools {
         // Texts and what has no name are in no report.
         let named = model.sheet.all().iter().filter(|mark| mark.is_named());
         self.filed.extend(named.cloned());
-        self.captures.report((self.folder.clone(), stem), report, self.stills().collect());
+        self.captures.report(self.folder.clone(), stem, report, self.stills().collect());
     }
 
     /// Drops everything that a device holds.

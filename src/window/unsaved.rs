@@ -1,8 +1,8 @@
 //! Unsaved work.
 
+use super::exit::Exit;
 use super::model::Model;
 use super::tools::Tools;
-use super::way::Way;
 
 /// The unsaved work that a way would lose.
 pub(super) struct Unsaved {
@@ -16,8 +16,8 @@ pub(super) struct Unsaved {
 
 impl Unsaved {
     /// What a way out would lose; `with_pose` counts the probe's pose among the settings.
-    pub(super) fn of(way: &Way, model: &Model, tools: &Tools, with_pose: bool) -> Self {
-        let whole = matches!(way, Way::Quit | Way::Open(_));
+    pub(super) fn of(exit: &Exit, model: &Model, tools: &Tools, with_pose: bool) -> Self {
+        let whole = matches!(exit, Exit::Quit | Exit::Open(_));
         let recording = whole && model.trajectory.recorder.is_some();
         Self {
             settings: whole && model.is_modified(with_pose),
@@ -28,15 +28,15 @@ impl Unsaved {
 
     /// All that is unsaved.
     pub(super) fn of_all(model: &Model, tools: &Tools, with_pose: bool) -> Self {
-        Self::of(&Way::Quit, model, tools, with_pose)
+        Self::of(&Exit::Quit, model, tools, with_pose)
     }
 
     /// What is unsaved, in words.
     pub(super) fn words(&self) -> Vec<String> {
         let settings = self.settings.then(|| "Settings, named poses".to_owned());
-        let way = self.trajectory.then(|| "A recorded trajectory".to_owned());
+        let recorded = self.trajectory.then(|| "A recorded trajectory".to_owned());
         let marks = (self.marks > 0).then(|| format!("Measurements and texts, {}", self.marks));
-        settings.into_iter().chain(way).chain(marks).collect()
+        settings.into_iter().chain(recorded).chain(marks).collect()
     }
 
     pub(super) fn is_empty(&self) -> bool {

@@ -5,7 +5,7 @@
 //! femur is left out: its 7 mm are a few resolution cells, and its ends fade into the tissue around it.
 
 use glam::{DAffine3, DQuat, DVec2, DVec3};
-use insonify::exam::{Kind, Measured, Worksheet};
+use insonify::exam::{CaliperKind, Measured, Worksheet};
 use insonify::gpu::test_device;
 use insonify::settings::{Exam, GreyMap};
 use insonify::sim::shaders::Library;
@@ -150,7 +150,7 @@ fn skull(lie: &Lie, radius: f64, name: &str) -> Vec<Measured> {
         let edge = |from, to| picture.edge_of_line(from, to, HALF_AMPLITUDE);
         let near = edge(beside(0.0, -radius - 4.0), beside(0.0, 4.0 - radius));
         let far = edge(beside(0.0, radius - 4.0), beside(0.0, radius + 4.0));
-        named(Kind::Distance, vec![near, far], name)
+        named(CaliperKind::Distance, vec![near, far], name)
     };
     pictures(lie).iter().map(one).collect()
 }
@@ -169,7 +169,7 @@ fn trunk(lie: &Lie) -> Vec<Measured> {
             beside(marks[1], middle)
         };
         let [left, right] = [-12.0, 12.0].map(side);
-        named(Kind::Ellipse, vec![left, right, near], "AC")
+        named(CaliperKind::Ellipse, vec![left, right, near], "AC")
     };
     pictures(lie).iter().map(one).collect()
 }
@@ -180,7 +180,7 @@ fn crown_to_rump(lie: &Lie, half: f64) -> Vec<Measured> {
         let crown =
             picture.edge_of_line(beside(half + 4.0, 0.0), beside(half - 2.0, 0.0), HALF_AMPLITUDE);
         let rump = picture.edge_of_tissue(beside(-half - 4.0, 0.0), beside(8.0 - half, 0.0));
-        named(Kind::Distance, vec![crown, rump], "CRL")
+        named(CaliperKind::Distance, vec![crown, rump], "CRL")
     };
     pictures(lie).iter().map(one).collect()
 }

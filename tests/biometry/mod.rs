@@ -11,7 +11,7 @@ use std::f64::consts::TAU;
 use std::path::Path;
 
 use glam::{DAffine3, DVec2, DVec3};
-use insonify::exam::{Kind, Measured, Worksheet};
+use insonify::exam::{CaliperKind, Measured, Worksheet};
 use insonify::scene::{Mesh, Scene};
 use insonify::settings::Exam;
 use insonify::view::model::calipers::Caliper;
@@ -82,7 +82,7 @@ fn outline(cut: &[[DVec2; 2]], centre: DVec2, start: f64, count: u32) -> Vec<DVe
     (0..count).filter_map(|i| far(ray(i))).collect()
 }
 
-fn named(kind: Kind, points: Vec<DVec2>, name: &str) -> Measured {
+fn named(kind: CaliperKind, points: Vec<DVec2>, name: &str) -> Measured {
     Caliper { label: name.into(), ..Caliper::new(kind, points) }.measured()
 }
 
@@ -117,9 +117,9 @@ fn the_fetus_is_measured_as_large_as_it_was_made() {
     };
     let (sides, front) = ([axis(DVec2::X), axis(-DVec2::X)], [axis(DVec2::Y), axis(-DVec2::Y)]);
     let mut all = vec![
-        named(Kind::Distance, vec![sides[0], sides[1]], "BPD"),
-        named(Kind::Distance, vec![front[0], front[1]], "OFD"),
-        named(Kind::Ellipse, vec![front[0], front[1], sides[0]], "HC"),
+        named(CaliperKind::Distance, vec![sides[0], sides[1]], "BPD"),
+        named(CaliperKind::Distance, vec![front[0], front[1]], "OFD"),
+        named(CaliperKind::Ellipse, vec![front[0], front[1], sides[0]], "HC"),
     ];
     let trunk = placed(&scene, "trunk");
     // Across the trunk at the navel.
@@ -128,7 +128,7 @@ fn the_fetus_is_measured_as_large_as_it_was_made() {
     let around = cut(&trunk, &plane(navel - 40.0 * back, left, back));
     let around = outline(&around, DVec2::new(0.0, 40.0), 0.0, 240);
     let [right, behind, front] = [0, 60, 180].map(|i| around[i]);
-    all.push(named(Kind::Ellipse, vec![front, behind, right], "AC"));
+    all.push(named(CaliperKind::Ellipse, vec![front, behind, right], "AC"));
     let femur = placed(&scene, "left-femur");
     let ends = femur.iter().flatten();
     let pairs = ends.clone().flat_map(|a| ends.clone().map(move |b| [*a, *b]));
@@ -140,7 +140,7 @@ fn the_fetus_is_measured_as_large_as_it_was_made() {
         let point = along.inverse().transform_point3(point);
         DVec2::new(point.x, point.z)
     };
-    all.push(named(Kind::Distance, vec![flat(knee), flat(hip)], "FL"));
+    all.push(named(CaliperKind::Distance, vec![flat(knee), flat(hip)], "FL"));
     let rump = trunk.iter().flatten().min_by(|a, b| a.dot(crown).total_cmp(&b.dot(crown)));
     let top = placed(&scene, "head");
     let top = top.iter().flatten().max_by(|a, b| a.dot(crown).total_cmp(&b.dot(crown)));
@@ -151,7 +151,7 @@ fn the_fetus_is_measured_as_large_as_it_was_made() {
         let point = long.inverse().transform_point3(point);
         DVec2::new(point.x, point.z)
     };
-    all.push(named(Kind::Distance, vec![seen(top), seen(rump)], "CRL"));
+    all.push(named(CaliperKind::Distance, vec![seen(top), seen(rump)], "CRL"));
     let sheet = Worksheet::of(Exam::Obstetric, &all);
     for (name, expected) in [
         ("BPD", BPD),
@@ -189,7 +189,7 @@ fn apical(ventricle: &[[DVec3; 3]], names: [&str; 2]) -> [Measured; 2] {
         let lines = cut(ventricle, &pose);
         let centre = DVec2::new(0.0, 20.0 + 0.6 * apex.distance(annulus));
         // From the annulus, which lies deepest, once around.
-        named(Kind::Trace, outline(&lines, centre, TAU / 4.0, 240), name)
+        named(CaliperKind::Trace, outline(&lines, centre, TAU / 4.0, 240), name)
     };
     [of(side, names[0]), of(side.cross(axis), names[1])]
 }

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use insonify::gpu::test_device;
-use insonify::probe::{Kind, Probe};
+use insonify::probe::{Probe, ProbeKind};
 use insonify::scene::{Scene, Wire, shapes};
 use insonify::settings::Refraction;
 use insonify::sim::shaders::Library;
@@ -87,7 +87,7 @@ fn wires_behind_bumps_stand_as_in_a_full_wave_simulation() {
         waves.iter().map(|[length, phase, a]| a * (TAU * x / length + phase).sin()).sum::<f64>()
     };
     let probe = Probe {
-        kind: Kind::Linear { width: 17.0 },
+        kind: ProbeKind::Linear { width: 17.0 },
         scanlines: 136,
         elevation_layers: 1,
         samples: 2048,

@@ -2,7 +2,7 @@
 
 use glam::{DAffine3, DQuat, DVec2, DVec3};
 use insonify::gpu::test_device;
-use insonify::probe::{Kind, Probe};
+use insonify::probe::{Probe, ProbeKind};
 use insonify::scene::{Mesh, Scene, shapes};
 use insonify::settings::Refraction;
 use insonify::sim::shaders::Library;
@@ -25,7 +25,7 @@ const POSES: usize = 5;
 /// The block below fat, with vessels.
 fn phantom(block: Mesh) -> Scene {
     let probe = Probe {
-        kind: Kind::Linear { width: 48.0 },
+        kind: ProbeKind::Linear { width: 48.0 },
         scanlines: 96,
         elevation_layers: 1,
         samples: 1024,

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{LN_2, PI, TAU};
 
-use insonify::probe::Kind;
+use insonify::probe::ProbeKind;
 use insonify::scene::Scene;
 use serde_json::Value;
 
@@ -143,7 +143,7 @@ impl Array {
         let probe = &mut scene.probe;
         if self.f_number.is_none() {
             let field_of_view = 8.0 * self.wavelength() * self.f_number(depth) / depth;
-            probe.kind = Kind::Phased { field_of_view };
+            probe.kind = ProbeKind::Phased { field_of_view };
         }
         probe.samples = 2048;
         probe.frequency = self.frequency;

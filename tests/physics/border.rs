@@ -3,7 +3,7 @@
 use std::f64::consts::FRAC_2_SQRT_PI;
 
 use glam::{DAffine3, DVec3};
-use insonify::probe::Kind;
+use insonify::probe::ProbeKind;
 use insonify::scene::{Keyframes, Scene, shapes};
 
 use crate::common::moments::{mean, signal_to_noise};
@@ -31,7 +31,7 @@ const FALL: f64 = 1.812;
 /// A probe, the depths between which lines are averaged, mm, inside the body, and the number of images.
 struct Case {
     what: &'static str,
-    kind: Kind,
+    kind: ProbeKind,
     lines: u32,
     f_number: f64,
     depths: [f64; 2],
@@ -42,7 +42,7 @@ struct Case {
 
 const LINEAR: Case = Case {
     what: "lines 0.1 mm apart, F/2",
-    kind: Kind::Linear { width: 8.0 },
+    kind: ProbeKind::Linear { width: 8.0 },
     lines: 80,
     f_number: 2.0,
     depths: [32.0, 88.0],
@@ -57,7 +57,7 @@ const CASES: [Case; 6] = [
     Case { what: "deformed tissue, F/2", deformed: true, ..LINEAR },
     Case {
         what: "convex, F/2",
-        kind: Kind::Convex { radius: 50.0, field_of_view: 0.1 },
+        kind: ProbeKind::Convex { radius: 50.0, field_of_view: 0.1 },
         lines: 64,
         depths: [50.0, 70.0],
         seeds: 12,
@@ -65,7 +65,7 @@ const CASES: [Case; 6] = [
     },
     Case {
         what: "phased, F/2",
-        kind: Kind::Phased { field_of_view: 0.2 },
+        kind: ProbeKind::Phased { field_of_view: 0.2 },
         lines: 80,
         depths: [50.0, 70.0],
         seeds: 12,

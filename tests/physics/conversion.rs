@@ -1,6 +1,6 @@
 //! Scan conversion alone on the device.
 
-use insonify::probe::{Kind, Probe};
+use insonify::probe::{Probe, ProbeKind};
 use insonify::scene::Scene;
 use insonify::sim::{layout, tables};
 
@@ -42,11 +42,11 @@ fn compare(scene: &Scene, frame: &layout::Frame, pixels: &[u32], shift: [f64; 2]
             let x = f64::from(frame.image_left) + (f64::from(i) + 0.5) * pitch;
             let z = f64::from(frame.image_top) + (f64::from(j) + 0.5) * pitch;
             let (depth, across) = match probe.kind {
-                Kind::Convex { radius, field_of_view } => {
+                ProbeKind::Convex { radius, field_of_view } => {
                     (x.hypot(z + radius) - radius, x.atan2(z + radius) / field_of_view)
                 }
-                Kind::Phased { field_of_view } => (x.hypot(z), x.atan2(z) / field_of_view),
-                Kind::Linear { width } => (z, x / width),
+                ProbeKind::Phased { field_of_view } => (x.hypot(z), x.atan2(z) / field_of_view),
+                ProbeKind::Linear { width } => (z, x / width),
             };
             // The outer half scanlines and the last sample are clamped, not interpolated.
             let (column, row) = ((across + 0.5) * lines - 0.5, depth / probe.sample_pitch());
@@ -123,11 +123,11 @@ fn conversion(bench: &Bench, physics: Physics) -> Outcome {
         )
         .unlike("a function too flat to tell", 0.0);
         let area = match probe.kind {
-            Kind::Convex { radius, field_of_view } => {
+            ProbeKind::Convex { radius, field_of_view } => {
                 field_of_view / 2.0 * ((radius + probe.depth).powi(2) - radius * radius)
             }
-            Kind::Phased { field_of_view } => field_of_view / 2.0 * probe.depth.powi(2),
-            Kind::Linear { width } => width * probe.depth,
+            ProbeKind::Phased { field_of_view } => field_of_view / 2.0 * probe.depth.powi(2),
+            ProbeKind::Linear { width } => width * probe.depth,
         };
         out.compare(format!("{name}: area, mm^2"), got.area, area, 0.005 * area)
             .unlike("pixels half a percent larger", 1.005 * 1.005 * area);

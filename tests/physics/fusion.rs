@@ -421,7 +421,8 @@ fn balls(bench: &Bench, physics: Physics) -> Outcome {
     ] {
         for tracer in TRACERS {
             let mut scene = linear(96, 40.0, silent(1.54, 1.63, 0.0));
-            scene.probe.kind = insonify::probe::Kind::Convex { radius: 30.0, field_of_view: 1.1 };
+            scene.probe.kind =
+                insonify::probe::ProbeKind::Convex { radius: 30.0, field_of_view: 1.1 };
             scene.probe.depth = 70.0;
             scene.probe.samples = 700;
             scene.imaging.image_height = 160;

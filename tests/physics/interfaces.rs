@@ -1,7 +1,7 @@
 //! Reflection, refraction and attenuation along traced paths.
 
 use glam::{DAffine3, DVec3};
-use insonify::probe::Kind;
+use insonify::probe::ProbeKind;
 use insonify::scene::{Scene, Tissue};
 use insonify::settings::Loss;
 use insonify::sim::Tracer;
@@ -54,7 +54,7 @@ fn through(before: [f64; 2], behind: [f64; 2], tilt: f64) -> Option<Segment> {
 /// Scanlines from a point, one at each whole degree, that meet a wall across the depth axis.
 fn fan(before: [f64; 2], behind: [f64; 2]) -> Scene {
     let mut scene = linear(179, 1.0, silent(before[0], before[1], 0.0));
-    scene.probe.kind = Kind::Phased { field_of_view: 179f64.to_radians() };
+    scene.probe.kind = ProbeKind::Phased { field_of_view: 179f64.to_radians() };
     scene.probe.samples = 64;
     // Near total reflection, and into air, little goes through.
     scene.simulation.min_weight = 1e-12;

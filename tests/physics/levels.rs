@@ -1,6 +1,6 @@
 //! Brightness over depth, and the sector of the picture.
 
-use insonify::probe::{Kind, Probe};
+use insonify::probe::{Probe, ProbeKind};
 use insonify::scene::Scene;
 
 use crate::physics::check::{Bench, Check, Curve, Outcome, Physics, Plot};
@@ -139,11 +139,11 @@ fn sector(probe: &Probe) -> [f64; 2] {
     let d = probe.depth;
     let fan = |r: f64, angle: f64| angle / 2.0 * ((r + d).powi(2) - r * r);
     match probe.kind {
-        Kind::Convex { radius, field_of_view } => {
+        ProbeKind::Convex { radius, field_of_view } => {
             [fan(radius, field_of_view), d + radius * (1.0 - (field_of_view / 2.0).cos())]
         }
-        Kind::Phased { field_of_view } => [fan(0.0, field_of_view), d],
-        Kind::Linear { width } => [width * d, d],
+        ProbeKind::Phased { field_of_view } => [fan(0.0, field_of_view), d],
+        ProbeKind::Linear { width } => [width * d, d],
     }
 }
 

@@ -1,7 +1,7 @@
 //! The edge of a shadow: as wide as the aperture that converges on what lies behind it.
 
 use glam::{DAffine3, DVec3};
-use insonify::probe::Kind;
+use insonify::probe::ProbeKind;
 use insonify::scene::Scene;
 use insonify::settings::Loss;
 
@@ -31,7 +31,7 @@ const HALF: f64 = 1.5;
 /// A probe, the depth of the edge, and the depths behind it where the shadow's side is measured, mm.
 struct Case {
     what: &'static str,
-    kind: Kind,
+    kind: ProbeKind,
     /// Of transmission, in a focus at the last depth, and of reception.
     f_numbers: [f64; 2],
     edge: f64,
@@ -41,28 +41,28 @@ struct Case {
 const CASES: [Case; 4] = [
     Case {
         what: "F/2 behind 17 mm",
-        kind: Kind::Linear { width: 38.4 },
+        kind: ProbeKind::Linear { width: 38.4 },
         f_numbers: [2.0, 2.0],
         edge: 17.0,
         depths: [25.0, 30.0, 40.0],
     },
     Case {
         what: "F/2 behind 8 mm",
-        kind: Kind::Linear { width: 38.4 },
+        kind: ProbeKind::Linear { width: 38.4 },
         f_numbers: [2.0, 2.0],
         edge: 8.0,
         depths: [14.0, 22.0, 36.0],
     },
     Case {
         what: "F/4 and F/3 behind 17 mm",
-        kind: Kind::Linear { width: 38.4 },
+        kind: ProbeKind::Linear { width: 38.4 },
         f_numbers: [4.0, 3.0],
         edge: 17.0,
         depths: [28.0, 36.0, 48.0],
     },
     Case {
         what: "convex, F/2 behind 25 mm",
-        kind: Kind::Convex { radius: 50.0, field_of_view: 1.0 },
+        kind: ProbeKind::Convex { radius: 50.0, field_of_view: 1.0 },
         f_numbers: [2.0, 2.0],
         edge: 25.0,
         depths: [38.0, 48.0, 60.0],
@@ -83,9 +83,9 @@ fn behind_a_plate(case: &Case, seed: u32) -> Scene {
 }
 
 /// Place of a scanline's point at a depth, in the image plane, and where an element `beside` mm from its start is.
-fn geometry(kind: Kind, across: f64, depth: f64, beside: f64) -> [[f64; 2]; 2] {
+fn geometry(kind: ProbeKind, across: f64, depth: f64, beside: f64) -> [[f64; 2]; 2] {
     match kind {
-        Kind::Convex { radius, .. } => {
+        ProbeKind::Convex { radius, .. } => {
             let at = |angle: f64, r: f64| [r * angle.sin(), r * angle.cos() - radius];
             let angle = across / (radius + depth);
             [at(angle, radius + depth), at(angle + beside / radius, radius)]

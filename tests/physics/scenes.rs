@@ -1,7 +1,7 @@
 //! Small scenes with known answers.
 
 use glam::{DAffine3, DVec3};
-use insonify::probe::{Kind, Probe};
+use insonify::probe::{Probe, ProbeKind};
 use insonify::scene::{Instance, Keyframes, Mesh, Scene, Surface, Tissue, Wire, shapes};
 use insonify::settings::Simulation;
 
@@ -38,7 +38,7 @@ pub fn mirror() -> Surface {
 /// layer, no noise, one path and no reflected paths.
 pub fn linear(lines: u32, width: f64, background: Tissue) -> Scene {
     let probe = Probe {
-        kind: Kind::Linear { width },
+        kind: ProbeKind::Linear { width },
         scanlines: lines,
         elevation_layers: 1,
         ..Probe::paper_table1()

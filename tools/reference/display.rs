@@ -1,7 +1,7 @@
 //! Twin of `display`: scan conversion and grey map.
 
 use super::geometry::probe;
-use insonify::probe::Kind;
+use insonify::probe::ProbeKind;
 use insonify::sim::layout::{FLAG_LINE, Frame};
 
 /// Column and row in the scanlines of each pixel, row by row; none outside the sector.
@@ -41,9 +41,9 @@ pub fn sector(frame: &Frame, x: f64, z: f64) -> Option<[f64; 2]> {
         (x.hypot(z + radius) - radius, angle / field_of_view)
     };
     let (depth, across) = match probe(frame).kind {
-        Kind::Convex { radius, field_of_view } => fan(radius, field_of_view),
-        Kind::Phased { field_of_view } => fan(0.0, field_of_view),
-        Kind::Linear { width } => (z, x / width),
+        ProbeKind::Convex { radius, field_of_view } => fan(radius, field_of_view),
+        ProbeKind::Phased { field_of_view } => fan(0.0, field_of_view),
+        ProbeKind::Linear { width } => (z, x / width),
     };
     let inside = across.abs() <= 0.5 && (0.0..f64::from(frame.depth)).contains(&depth);
     let column = (across + 0.5) * f64::from(frame.scanlines) - 0.5;

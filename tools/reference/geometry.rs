@@ -3,7 +3,7 @@
 use glam::{DAffine3, DVec3};
 
 use super::world::affine;
-use insonify::probe::{Kind, Probe};
+use insonify::probe::{Probe, ProbeKind};
 use insonify::sim::layout::{Frame, KIND_CONVEX, KIND_LINEAR, KIND_PHASED};
 
 /// A line's start and axes.
@@ -26,9 +26,9 @@ pub fn probe(frame: &Frame) -> Probe {
     let field_of_view = frame.field_of_view.into();
     Probe {
         kind: match frame.kind {
-            KIND_CONVEX => Kind::Convex { radius: frame.radius.into(), field_of_view },
-            KIND_LINEAR => Kind::Linear { width: frame.width.into() },
-            KIND_PHASED => Kind::Phased { field_of_view },
+            KIND_CONVEX => ProbeKind::Convex { radius: frame.radius.into(), field_of_view },
+            KIND_LINEAR => ProbeKind::Linear { width: frame.width.into() },
+            KIND_PHASED => ProbeKind::Phased { field_of_view },
             kind => panic!("probe kind {kind}"),
         },
         scanlines: frame.face_lines(),
@@ -76,7 +76,7 @@ pub fn world_line(frame: &Frame, l: u32, e: u32) -> Line {
 pub fn face(frame: &Frame, origin: DVec3, direction: DVec3, t_min: f64) -> Option<(f64, DVec3)> {
     let probe = probe(frame);
     let (t, normal, inside) = match probe.kind {
-        Kind::Convex { radius, field_of_view } => {
+        ProbeKind::Convex { radius, field_of_view } => {
             let axis = DVec3::new(0.0, 0.0, -radius);
             let across = |v: DVec3| DVec3::new(v.x, 0.0, v.z);
             let (from, along) = (across(origin - axis), across(direction));
@@ -90,7 +90,7 @@ pub fn face(frame: &Frame, origin: DVec3, direction: DVec3, t_min: f64) -> Optio
             let normal = (from + t * along).normalize();
             (t, normal, normal.x.atan2(normal.z).abs() <= field_of_view / 2.0)
         }
-        Kind::Linear { width } => {
+        ProbeKind::Linear { width } => {
             if direction.z >= 0.0 {
                 return None;
             }
@@ -98,7 +98,7 @@ pub fn face(frame: &Frame, origin: DVec3, direction: DVec3, t_min: f64) -> Optio
             let x = origin.x + t * direction.x;
             (t, DVec3::Z, x.abs() <= width / 2.0)
         }
-        Kind::Phased { .. } => return None,
+        ProbeKind::Phased { .. } => return None,
     };
     let y = origin.y + t * direction.y;
     let high_enough = y.abs() <= f64::from(frame.face_height) / 2.0;

@@ -66,7 +66,8 @@ impl Case {
         &self,
         plan: &Plan,
         loaded: &Loaded,
-        (number, image): (usize, usize),
+        number: usize,
+        image: usize,
         entries: &[(String, String)],
     ) -> Row {
         let scenario = &plan.scenarios[self.scenario];

@@ -114,7 +114,7 @@ impl Maker<'_> {
             // True once an image of an earlier run has been made again.
             let mut compared = false;
             for image in 1..=case.images.len() {
-                let mut row = case.row(self.plan, loaded, (number, image), &entries);
+                let mut row = case.row(self.plan, loaded, number, image, &entries);
                 let earlier = self.folder.made(number, image)?;
                 let png = match earlier {
                     Some(png) if compared => png,

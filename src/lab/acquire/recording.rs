@@ -3,7 +3,7 @@
 use glam::{DAffine3, DMat3, DVec3};
 
 use super::AcquireError;
-use crate::probe::Kind;
+use crate::probe::ProbeKind;
 use crate::scene::Scene;
 use crate::sim::Simulator;
 use crate::sim::layout::Frame;
@@ -28,9 +28,9 @@ fn probe_from_image(frame: &Frame) -> DAffine3 {
 /// The part of the image that holds echoes, pixels; none where it is the whole image.
 fn fan(scene: &Scene, probe_from_image: &DAffine3) -> Option<Fan> {
     let (radius, angle) = match scene.probe.kind {
-        Kind::Convex { radius, field_of_view } => (radius, field_of_view),
-        Kind::Phased { field_of_view } => (0.0, field_of_view),
-        Kind::Linear { .. } => return None,
+        ProbeKind::Convex { radius, field_of_view } => (radius, field_of_view),
+        ProbeKind::Phased { field_of_view } => (0.0, field_of_view),
+        ProbeKind::Linear { .. } => return None,
     };
     let apex = DVec3::new(0.0, 0.0, -radius);
     let origin = probe_from_image.inverse().transform_point3(apex);

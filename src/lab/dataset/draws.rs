@@ -27,7 +27,7 @@ pub(super) struct Draw {
     pub at: String,
     /// The facts about the setting; none of a variable.
     pub facts: Option<&'static Facts>,
-    pub kind: Kind,
+    pub kind: DrawKind,
     /// The draw with which it is correlated, and the coefficient between the two normal numbers behind them.
     pub with: Option<(usize, f64)>,
     /// True for a part of the pose, which is drawn again where the probe does not stand as wanted.
@@ -35,7 +35,7 @@ pub(super) struct Draw {
 }
 
 #[derive(Clone, Debug)]
-pub(super) enum Kind {
+pub(super) enum DrawKind {
     /// The same value always: its text in TOML, and its number if it is one.
     Constant(Drawn),
     /// A number.
@@ -71,9 +71,9 @@ impl Draw {
     /// The values at both ends, or all of them where they can be counted; `all` are the draws to which it belongs.
     pub fn ends(&self, all: &[Draw]) -> Vec<Drawn> {
         match &self.kind {
-            Kind::Constant(value) => vec![value.clone()],
-            Kind::Choice(values, _) => values.clone(),
-            Kind::Number(of) => {
+            DrawKind::Constant(value) => vec![value.clone()],
+            DrawKind::Choice(values, _) => values.clone(),
+            DrawKind::Number(of) => {
                 let ends = match of {
                     Distribution::Uniform(ends) | Distribution::LogUniform(ends) => *ends,
                     Distribution::Normal { limits, .. } => *limits,
@@ -81,7 +81,7 @@ impl Draw {
                 };
                 ends.map(|end| self.drawn(end)).to_vec()
             }
-            Kind::Follows { of, times, plus } => {
+            DrawKind::Follows { of, times, plus } => {
                 let followed = all[*of].ends(all).into_iter().filter_map(|v| v.number);
                 followed.map(|number| self.drawn(plus + times * number)).collect()
             }
@@ -93,9 +93,11 @@ impl Draw {
 pub(super) fn draw(all: &[Draw], index: usize, count: Count) -> Drawn {
     let own = &all[index];
     match &own.kind {
-        Kind::Constant(value) => value.clone(),
-        Kind::Choice(values, of) => values[of.quantile(share(all, index, count)) as usize].clone(),
-        Kind::Number(of) => {
+        DrawKind::Constant(value) => value.clone(),
+        DrawKind::Choice(values, of) => {
+            values[of.quantile(share(all, index, count)) as usize].clone()
+        }
+        DrawKind::Number(of) => {
             let exact = match own.facts.map(|f| f.form) {
                 // Each whole number between the ends is as likely.
                 Some(Form::Whole | Form::Integer) => match of {
@@ -111,7 +113,7 @@ pub(super) fn draw(all: &[Draw], index: usize, count: Count) -> Drawn {
             let [low, high] = [ends[0].number, ends[1].number].map(|end| end.expect("a number"));
             own.drawn(rounded(exact).clamp(low, high))
         }
-        Kind::Follows { of, times, plus } => {
+        DrawKind::Follows { of, times, plus } => {
             let followed = draw(all, *of, count).number.expect("checked with the plan");
             own.drawn(rounded(plus + times * followed))
         }
@@ -158,7 +160,7 @@ mod tests {
             name: name.to_owned(),
             at: String::new(),
             facts,
-            kind: Kind::Number(of),
+            kind: DrawKind::Number(of),
             with: None,
             again: false,
         }
@@ -220,7 +222,7 @@ mod tests {
     #[test]
     fn what_follows_follows_exactly_and_whole_numbers_are_equally_likely() {
         let mut second = number("b", Distribution::Uniform([0.0, 1.0]));
-        second.kind = Kind::Follows { of: 0, times: -2.0, plus: 1.0 };
+        second.kind = DrawKind::Follows { of: 0, times: -2.0, plus: 1.0 };
         let all = [number("a", Distribution::Uniform([0.0, 1.0])), second];
         for (a, b) in values(&all, 0).into_iter().zip(values(&all, 1)) {
             assert!((b - (1.0 - 2.0 * a)).abs() < 1e-5);

@@ -1,6 +1,6 @@
 //! Draws that refer to others: what follows, and what is correlated.
 
-use super::draws::{Draw, Kind};
+use super::draws::{Draw, DrawKind};
 use super::reading::Read;
 use crate::scene::SceneError;
 use crate::scene::file::Document;
@@ -26,7 +26,7 @@ pub(super) fn linked(document: &Document<'_>, read: Vec<Read>) -> Result<Vec<Dra
                 return Err(document.fail(&at, message, remedy));
             };
             match &mut draw.kind {
-                Kind::Follows { of, .. } => *of = index,
+                DrawKind::Follows { of, .. } => *of = index,
                 _ => draw.with = draw.with.map(|(_, coefficient)| (index, coefficient)),
             }
             places.push(Some((index, at)));
@@ -53,12 +53,12 @@ pub(super) fn linked(document: &Document<'_>, read: Vec<Read>) -> Result<Vec<Dra
         let Some((other, at)) = place else { continue };
         let number = draws[*other].ends(&draws).iter().all(|v| v.number.is_some());
         match &draw.kind {
-            Kind::Follows { .. } if !number => {
+            DrawKind::Follows { .. } if !number => {
                 let message = format!("`{}` is no number", names[*other]);
                 return Err(document.fail(at, message, "follow a number"));
             }
-            Kind::Follows { .. } => {}
-            _ if matches!(draws[*other].kind, Kind::Constant(_) | Kind::Follows { .. }) => {
+            DrawKind::Follows { .. } => {}
+            _ if matches!(draws[*other].kind, DrawKind::Constant(_) | DrawKind::Follows { .. }) => {
                 let message = format!("`{}` is not drawn by itself", names[*other]);
                 return Err(document.fail(
                     at,

@@ -4,7 +4,7 @@ use glam::{DAffine3, DVec3};
 use toml::{Table, Value as Toml};
 
 use super::distribution::Distribution;
-use super::draws::{Count, Draw, Drawn, Kind, draw};
+use super::draws::{Count, Draw, DrawKind, Drawn, draw};
 use super::reading::{Read, Target};
 use crate::scene::animation::{Track, Trs};
 use crate::scene::file::Document;
@@ -135,8 +135,8 @@ impl Poses {
         }
         if let Some((first, last)) = self.trajectory.as_ref().and_then(Track::span) {
             let kind = match first < last {
-                true => Kind::Number(Distribution::Uniform([first, last])),
-                false => Kind::Constant(Drawn { number: Some(first), text: plain(first) }),
+                true => DrawKind::Number(Distribution::Uniform([first, last])),
+                false => DrawKind::Constant(Drawn { number: Some(first), text: plain(first) }),
             };
             let at = format!("{at}.trajectory");
             let facts = Some(&MOMENT);

@@ -4,7 +4,7 @@ use serde::de::DeserializeSeed;
 use toml::{Table, Value as Toml};
 
 use super::distribution::Distribution;
-use super::draws::{Draw, Drawn, Kind};
+use super::draws::{Draw, DrawKind, Drawn};
 use crate::scene::SceneError;
 use crate::scene::file::{Document, quoted, setting};
 use crate::settings::{Facts, Form, Value, suggest};
@@ -100,7 +100,7 @@ impl Target<'_> {
                 return self.fail("", message, &remedy);
             }
             let constant = self.value(value, &form, "")?;
-            return Ok(self.made(Kind::Constant(constant), None, None));
+            return Ok(self.made(DrawKind::Constant(constant), None, None));
         };
         let allowed = BESIDE[kind];
         if let Some(wrong) =
@@ -124,7 +124,7 @@ impl Target<'_> {
         }
         let made = match word {
             "choice" => self.choice(table, given, &form)?,
-            "normal" => Kind::Number(self.normal(table, given, &form)?),
+            "normal" => DrawKind::Number(self.normal(table, given, &form)?),
             _ => {
                 let ends = self.pair(given, &form, word, ["low", "high"])?;
                 self.ordered(ends, word)?;
@@ -132,7 +132,7 @@ impl Target<'_> {
                     let message = format!("{} has no logarithm", ends[0]);
                     return self.fail(&format!("{word}.0"), message, "both ends must be above 0");
                 }
-                Kind::Number(match word {
+                DrawKind::Number(match word {
                     "uniform" => Distribution::Uniform(ends),
                     _ => Distribution::LogUniform(ends),
                 })
@@ -145,7 +145,7 @@ impl Target<'_> {
 
     fn made(
         &self,
-        kind: Kind,
+        kind: DrawKind,
         with: Option<(usize, f64)>,
         other: Option<(String, String)>,
     ) -> Read {
@@ -271,7 +271,7 @@ impl Target<'_> {
         Ok(made)
     }
 
-    fn choice(&self, table: &Table, given: &Toml, form: &Form) -> Result<Kind, SceneError> {
+    fn choice(&self, table: &Table, given: &Toml, form: &Form) -> Result<DrawKind, SceneError> {
         let Some(values) = given.as_array().filter(|all| !all.is_empty()) else {
             return self.fail(
                 "choice",
@@ -309,7 +309,7 @@ impl Target<'_> {
         let last = weights.iter().rposition(|w| *w > 0.0).expect("their sum is above 0");
         sums[last..].fill(1.0);
         let sums = sums[..=last].to_vec();
-        Ok(Kind::Choice(values, Distribution::Place(sums)))
+        Ok(DrawKind::Choice(values, Distribution::Place(sums)))
     }
 
     fn weight(&self, value: &Toml, below: &str) -> Result<f64, SceneError> {
@@ -330,7 +330,7 @@ impl Target<'_> {
             table.get("times").map_or(Ok(1.0), |v| self.plain(v, &Form::Number, "times"))?;
         let plus = table.get("plus").map_or(Ok(0.0), |v| self.plain(v, form, "plus"))?;
         let other = Some((name.to_owned(), format!("{}.follows", self.at)));
-        Ok(self.made(Kind::Follows { of: usize::MAX, times, plus }, None, other))
+        Ok(self.made(DrawKind::Follows { of: usize::MAX, times, plus }, None, other))
     }
 
     fn with(&self, table: &Table) -> Result<Option<(String, f64)>, SceneError> {

@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::path::Path;
 use std::slice;
 
-use super::draws::{Draw, Kind};
+use super::draws::{Draw, DrawKind};
 use super::links::linked;
 use super::plan::{PlanScene, TIME};
 use super::pose::Poses;
@@ -129,7 +129,7 @@ impl Reading<'_> {
     /// in are added to the scene's.
     fn ends(&self, made: &PlanScene, scene: &mut Scene) -> Result<(), SceneError> {
         let entries = || made.draws.iter().filter(|d| is_entry(d, &made.poses, &made.draws));
-        let fixed = |d: &&Draw| matches!(d.kind, Kind::Constant(_));
+        let fixed = |d: &&Draw| matches!(d.kind, DrawKind::Constant(_));
         let always: Vec<_> = entries()
             .filter(fixed)
             .map(|d| (d.name.clone(), d.ends(&made.draws)[0].text.clone()))

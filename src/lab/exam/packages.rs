@@ -6,7 +6,7 @@ use crate::settings::Exam;
 
 /// Kind of a measurement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Kind {
+pub enum CaliperKind {
     /// Distance between two points, mm.
     Distance,
     /// Circumference and area: the ends of one axis, then half the other.
@@ -17,7 +17,7 @@ pub enum Kind {
     Trace,
 }
 
-impl Kind {
+impl CaliperKind {
     /// Name of the kind.
     pub fn name(self) -> &'static str {
         match self {
@@ -64,12 +64,14 @@ impl Quantity {
         }
     }
 
-    fn is_of(self, kind: Kind) -> bool {
+    fn is_of(self, kind: CaliperKind) -> bool {
         match self {
-            Self::Length => kind == Kind::Distance,
-            Self::Circumference | Self::Area => matches!(kind, Kind::Ellipse | Kind::Trace),
-            Self::Angle => kind == Kind::Angle,
-            Self::Discs => kind == Kind::Trace,
+            Self::Length => kind == CaliperKind::Distance,
+            Self::Circumference | Self::Area => {
+                matches!(kind, CaliperKind::Ellipse | CaliperKind::Trace)
+            }
+            Self::Angle => kind == CaliperKind::Angle,
+            Self::Discs => kind == CaliperKind::Trace,
         }
     }
 }
@@ -184,7 +186,7 @@ pub fn items(exam: Exam) -> impl Iterator<Item = &'static Item> {
 }
 
 /// The items that a measurement of a kind may be.
-pub fn names(exam: Exam, kind: Kind) -> impl Iterator<Item = &'static Item> {
+pub fn names(exam: Exam, kind: CaliperKind) -> impl Iterator<Item = &'static Item> {
     items(exam).filter(move |item| item.quantity.is_of(kind))
 }
 
@@ -276,11 +278,11 @@ mod tests {
             assert_eq!(all.len(), count, "{exam}");
         }
         let has = |exam, kind, name| names(exam, kind).any(|item| item.name == name);
-        assert!(has(Exam::Obstetric, Kind::Ellipse, "HC"));
-        assert!(has(Exam::Obstetric, Kind::Trace, "AC"));
-        assert!(!has(Exam::Obstetric, Kind::Distance, "HC"));
-        assert!(!has(Exam::Obstetric, Kind::Distance, "LVIDd"));
-        assert!(has(Exam::Cardiac, Kind::Trace, "LV ED 4C"));
-        assert!(has(Exam::Abdomen, Kind::Distance, "GB wall"));
+        assert!(has(Exam::Obstetric, CaliperKind::Ellipse, "HC"));
+        assert!(has(Exam::Obstetric, CaliperKind::Trace, "AC"));
+        assert!(!has(Exam::Obstetric, CaliperKind::Distance, "HC"));
+        assert!(!has(Exam::Obstetric, CaliperKind::Distance, "LVIDd"));
+        assert!(has(Exam::Cardiac, CaliperKind::Trace, "LV ED 4C"));
+        assert!(has(Exam::Abdomen, CaliperKind::Distance, "GB wall"));
     }
 }

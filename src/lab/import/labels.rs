@@ -83,7 +83,7 @@ impl LabelMap {
         }
         let Volume { size, world_from_voxel, voxels, later, .. } = volume;
         let layers = std::iter::once(voxels).chain(later);
-        Self::of(path, (size, world_from_voxel), layers, &segments, remarks)
+        Self::of(path, size, world_from_voxel, layers, &segments, remarks)
     }
 
     /// The label map of voxels that a program has, first axis fastest: a whole number each, 0 for none. `names` are those of
@@ -96,7 +96,8 @@ impl LabelMap {
     /// If there are not as many voxels as `size` says, or none.
     pub fn of_voxels(
         name: &Path,
-        (size, world_from_voxel): ([usize; 3], DAffine3),
+        size: [usize; 3],
+        world_from_voxel: DAffine3,
         voxels: Voxels,
         names: &[(u32, String)],
     ) -> Result<Self, FileError> {
@@ -108,13 +109,14 @@ impl LabelMap {
             names: vec![name.clone()],
         };
         let segments: Vec<Segment> = names.iter().map(segment).collect();
-        Self::of(name, (size, world_from_voxel), [voxels], &segments, Vec::new())
+        Self::of(name, size, world_from_voxel, [voxels], &segments, Vec::new())
     }
 
     /// The label map of layers of voxels; `segments` are what is said of their values, `remarks` what was said of the file.
     fn of(
         path: &Path,
-        (size, world_from_voxel): ([usize; 3], DAffine3),
+        size: [usize; 3],
+        world_from_voxel: DAffine3,
         layers: impl IntoIterator<Item = Voxels>,
         segments: &[Segment],
         mut remarks: Vec<String>,

@@ -4,7 +4,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use glam::DVec3;
 
-use super::{Kind, Probe};
+use super::{Probe, ProbeKind};
 
 impl Probe {
     /// The sector's bounding box in probe space: left, top, right, bottom, mm. The top of a convex
@@ -18,9 +18,9 @@ impl Probe {
             [-x, edge * half.cos() - radius, x, self.depth]
         };
         match self.kind {
-            Kind::Convex { radius, field_of_view } => fan(radius, field_of_view),
-            Kind::Phased { field_of_view } => fan(0.0, field_of_view),
-            Kind::Linear { width } => [-width / 2.0, 0.0, width / 2.0, self.depth],
+            ProbeKind::Convex { radius, field_of_view } => fan(radius, field_of_view),
+            ProbeKind::Phased { field_of_view } => fan(0.0, field_of_view),
+            ProbeKind::Linear { width } => [-width / 2.0, 0.0, width / 2.0, self.depth],
         }
     }
 
@@ -28,10 +28,10 @@ impl Probe {
     /// skin is as wide as its aperture.
     pub fn face_width(&self) -> f64 {
         match self.kind {
-            Kind::Convex { radius, field_of_view } => radius * field_of_view,
-            Kind::Linear { width } => width,
-            Kind::Phased { .. } if self.aperture.is_finite() => self.aperture,
-            Kind::Phased { .. } => self.transmit_aperture(),
+            ProbeKind::Convex { radius, field_of_view } => radius * field_of_view,
+            ProbeKind::Linear { width } => width,
+            ProbeKind::Phased { .. } if self.aperture.is_finite() => self.aperture,
+            ProbeKind::Phased { .. } => self.transmit_aperture(),
         }
     }
 
@@ -40,12 +40,12 @@ impl Probe {
     pub fn face(&self, across: f64, along: f64) -> (DVec3, DVec3) {
         let y = along * self.elevation_height;
         match self.kind {
-            Kind::Convex { radius, field_of_view } => {
+            ProbeKind::Convex { radius, field_of_view } => {
                 let (sin, cos) = (field_of_view * across).sin_cos();
                 let point = DVec3::new(radius * sin, y, radius * cos - radius);
                 (point, DVec3::new(sin, 0.0, cos))
             }
-            Kind::Linear { .. } | Kind::Phased { .. } => {
+            ProbeKind::Linear { .. } | ProbeKind::Phased { .. } => {
                 (DVec3::new(self.face_width() * across, y, 0.0), DVec3::Z)
             }
         }

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::{Kind, Probe};
+use super::{Probe, ProbeKind};
 
 impl Probe {
     /// Axial sample pitch dz = D/K, mm.
@@ -36,12 +36,12 @@ impl Probe {
     /// -1/2, its one edge, to 1/2.
     pub fn ray_across(&self, u: f64) -> (DVec3, DVec3) {
         match self.kind {
-            Kind::Convex { radius, field_of_view } => {
+            ProbeKind::Convex { radius, field_of_view } => {
                 let (sin, cos) = (field_of_view * u).sin_cos();
                 (DVec3::new(radius * sin, 0.0, radius * cos - radius), DVec3::new(sin, 0.0, cos))
             }
-            Kind::Linear { width } => (DVec3::new(width * u, 0.0, 0.0), DVec3::Z),
-            Kind::Phased { field_of_view } => {
+            ProbeKind::Linear { width } => (DVec3::new(width * u, 0.0, 0.0), DVec3::Z),
+            ProbeKind::Phased { field_of_view } => {
                 let (sin, cos) = (field_of_view * u).sin_cos();
                 (DVec3::ZERO, DVec3::new(sin, 0.0, cos))
             }
@@ -52,9 +52,9 @@ impl Probe {
     pub fn line_pitch(&self, z: f64) -> f64 {
         let lines = f64::from(self.scanlines);
         match self.kind {
-            Kind::Convex { radius, field_of_view } => (radius + z) * field_of_view / lines,
-            Kind::Linear { width } => width / lines,
-            Kind::Phased { field_of_view } => z * field_of_view / lines,
+            ProbeKind::Convex { radius, field_of_view } => (radius + z) * field_of_view / lines,
+            ProbeKind::Linear { width } => width / lines,
+            ProbeKind::Phased { field_of_view } => z * field_of_view / lines,
         }
     }
 }

@@ -84,7 +84,7 @@ fn read_raw(path: &Path, options: &Options, found: &mut Inspected) -> Option<(So
 
     let parts = match &options.node {
         // A node of a tree was chosen while that was read.
-        Some(node) if Kind::of(path) != Some(Kind::Gltf) => {
+        Some(node) if MeshFormat::of(path) != Some(MeshFormat::Gltf) => {
             let chosen: Vec<_> = parts.into_iter().filter(|p| p.name == *node).collect();
             if chosen.is_empty() {
                 found.issues.push(no_such_node(path, node, &found.parts));
@@ -102,20 +102,22 @@ fn read_raw(path: &Path, options: &Options, found: &mut Inspected) -> Option<(So
 /// the file begins as one of another does.
 fn read_parts(path: &Path, options: &Options) -> Result<Parts, Vec<Issue>> {
     let bytes = read_bounded(path)?;
-    let (named, found) = (Kind::of(path), Kind::by_content(&bytes));
+    let (named, found) = (MeshFormat::of(path), MeshFormat::by_content(&bytes));
     let kind = found.or(named);
-    if let Some(issue) = formats::utf16(path, &bytes).filter(|_| kind.is_some_and(Kind::is_text)) {
+    if let Some(issue) =
+        formats::utf16(path, &bytes).filter(|_| kind.is_some_and(MeshFormat::is_text))
+    {
         return Err(vec![issue]);
     }
     let mut out = match kind {
-        Some(Kind::Obj) => load_obj::read(path, &bytes),
-        Some(Kind::Gltf) => load_gltf::read(path, &bytes, options.node.as_deref()),
-        Some(Kind::Stl) => stl::read(path, &bytes),
-        Some(Kind::Ply) => ply::read(path, &bytes),
-        Some(Kind::Vtk) => vtk::read(path, &bytes),
-        Some(Kind::Vtp) => vtp::read(path, &bytes),
-        Some(Kind::Off) => off::read(path, &bytes),
-        Some(Kind::Threemf) => threemf::read(path, &bytes),
+        Some(MeshFormat::Obj) => load_obj::read(path, &bytes),
+        Some(MeshFormat::Gltf) => load_gltf::read(path, &bytes, options.node.as_deref()),
+        Some(MeshFormat::Stl) => stl::read(path, &bytes),
+        Some(MeshFormat::Ply) => ply::read(path, &bytes),
+        Some(MeshFormat::Vtk) => vtk::read(path, &bytes),
+        Some(MeshFormat::Vtp) => vtp::read(path, &bytes),
+        Some(MeshFormat::Off) => off::read(path, &bytes),
+        Some(MeshFormat::Threemf) => threemf::read(path, &bytes),
         None => {
             let remedy = format!("convert it to {EXTENSIONS}");
             Err(vec![Issue::error(path, 1, "not a mesh format that can be read", remedy)])
@@ -125,7 +127,7 @@ fn read_parts(path: &Path, options: &Options) -> Result<Parts, Vec<Issue>> {
         let message = format!("is read as {found:?}, as which it begins, whatever its name says");
         out.issues.push(Issue::warning(path, 1, message, "give it the extension of its format"));
     }
-    out.ras |= kind.is_some_and(Kind::is_text) && formats::states_ras(&bytes);
+    out.ras |= kind.is_some_and(MeshFormat::is_text) && formats::states_ras(&bytes);
     if out.ras && options.as_written {
         let message = "states that its frame is RAS: taken as it is written, as what names it does";
         out.issues.push(Issue::warning(path, 1, message, ""));
@@ -148,7 +150,7 @@ pub(super) fn no_such_node(path: &Path, node: &str, names: &[String]) -> Issue {
 pub(super) const EXTENSIONS: &str = ".obj, .stl, .ply, .vtk, .vtp, .off, .3mf, .gltf or .glb";
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
+enum MeshFormat {
     Obj,
     Gltf,
     Stl,
@@ -159,7 +161,7 @@ enum Kind {
     Threemf,
 }
 
-impl Kind {
+impl MeshFormat {
     fn of(path: &Path) -> Option<Self> {
         let extension = path.extension()?.to_str()?.to_ascii_lowercase();
         match extension.as_str() {
@@ -202,7 +204,7 @@ impl Kind {
 
 /// Returns whether the extension is that of a readable mesh file.
 pub fn is_mesh(path: &Path) -> bool {
-    Kind::of(path).is_some()
+    MeshFormat::of(path).is_some()
 }
 
 fn merge(parts: Vec<Soup>, units: Units) -> Soup {

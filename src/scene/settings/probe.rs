@@ -15,7 +15,7 @@ pub const MAX_SCANLINES: u32 = 4096;
 
 /// Arrangement of the scanlines.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Kind {
+pub enum ProbeKind {
     /// Curved array: scanlines start on an arc of `radius` mm and fan over `field_of_view` rad.
     Convex {
         /// Radius of the face, mm.
@@ -84,7 +84,7 @@ group! {
             Facts::quantity(&LENGTH, 0.0, 1000.0).under("Beam").label("Slice").usual(0.0, 20.0);
     } beside {
         /// Arrangement of the scanlines.
-        kind: Kind;
+        kind: ProbeKind;
     }
     last shape()
 }
@@ -97,7 +97,7 @@ const DEGREE: f64 = PI / 180.0;
 /// Words for the arrangements.
 const KINDS: [&str; 3] = ["convex", "linear", "phased"];
 
-impl Kind {
+impl ProbeKind {
     /// The word for it in scene files.
     pub fn word(&self) -> &'static str {
         match self {
@@ -131,7 +131,7 @@ impl Kind {
     }
 }
 
-/// The rows of the values in [`Kind`]. A key of another arrangement is absent, and setting it changes nothing.
+/// The rows of the values in [`ProbeKind`]. A key of another arrangement is absent, and setting it changes nothing.
 fn shape() -> [Row<Probe>; 4] {
     const KIND: Facts = Facts::one_of(&KINDS).key("kind").label("Kind");
     const RADIUS: Facts =
@@ -156,11 +156,12 @@ fn shape() -> [Row<Probe>; 4] {
         Row {
             facts: RADIUS.named("", "Radius of the face. Convex only."),
             get: |probe| match probe.kind {
-                Kind::Convex { radius, .. } => Value::Number(radius),
+                ProbeKind::Convex { radius, .. } => Value::Number(radius),
                 _ => Value::Absent,
             },
             set: |probe, value| {
-                if let (Kind::Convex { radius, .. }, Value::Number(new)) = (&mut probe.kind, value)
+                if let (ProbeKind::Convex { radius, .. }, Value::Number(new)) =
+                    (&mut probe.kind, value)
                 {
                     *radius = *new;
                 }
@@ -169,14 +170,16 @@ fn shape() -> [Row<Probe>; 4] {
         Row {
             facts: VIEW.named("", "Angle of the sector. Convex and phased."),
             get: |probe| match probe.kind {
-                Kind::Convex { field_of_view, .. } | Kind::Phased { field_of_view } => {
+                ProbeKind::Convex { field_of_view, .. } | ProbeKind::Phased { field_of_view } => {
                     Value::Number(field_of_view)
                 }
-                Kind::Linear { .. } => Value::Absent,
+                ProbeKind::Linear { .. } => Value::Absent,
             },
             set: |probe, value| match (&mut probe.kind, value) {
-                (Kind::Convex { field_of_view, .. }, Value::Number(new)) => *field_of_view = *new,
-                (Kind::Phased { field_of_view }, Value::Number(new)) => {
+                (ProbeKind::Convex { field_of_view, .. }, Value::Number(new)) => {
+                    *field_of_view = *new
+                }
+                (ProbeKind::Phased { field_of_view }, Value::Number(new)) => {
                     *field_of_view = new.min(WIDEST_PHASED);
                 }
                 _ => {}
@@ -185,11 +188,12 @@ fn shape() -> [Row<Probe>; 4] {
         Row {
             facts: WIDTH.named("", "Width of the face. Linear only."),
             get: |probe| match probe.kind {
-                Kind::Linear { width } => Value::Number(width),
+                ProbeKind::Linear { width } => Value::Number(width),
                 _ => Value::Absent,
             },
             set: |probe, value| {
-                if let (Kind::Linear { width }, Value::Number(new)) = (&mut probe.kind, value) {
+                if let (ProbeKind::Linear { width }, Value::Number(new)) = (&mut probe.kind, value)
+                {
                     *width = *new;
                 }
             },
@@ -219,7 +223,7 @@ impl Probe {
     /// 7 MHz. Radius, slice thickness and the focusing are ours: the paper does not print them.
     pub fn paper_table1() -> Self {
         Self {
-            kind: Kind::Convex { radius: 11.0, field_of_view: std::f64::consts::FRAC_PI_2 },
+            kind: ProbeKind::Convex { radius: 11.0, field_of_view: std::f64::consts::FRAC_PI_2 },
             scanlines: 192,
             elevation_layers: 7,
             samples: 2048,
@@ -241,7 +245,7 @@ impl Probe {
     pub fn abdominal() -> Self {
         Self {
             bandwidth: PULSE,
-            kind: Kind::Convex { radius: 50.0, field_of_view: 65f64.to_radians() },
+            kind: ProbeKind::Convex { radius: 50.0, field_of_view: 65f64.to_radians() },
             depth: 160.0,
             frequency: 3.5,
             focus: 80.0,
@@ -258,7 +262,7 @@ impl Probe {
     pub fn cardiac() -> Self {
         Self {
             bandwidth: PULSE,
-            kind: Kind::Convex { radius: 5.0, field_of_view: 80f64.to_radians() },
+            kind: ProbeKind::Convex { radius: 5.0, field_of_view: 80f64.to_radians() },
             depth: 150.0,
             frequency: 3.0,
             focus: 75.0,
@@ -273,7 +277,7 @@ impl Probe {
     /// Linear small-parts array: 38 mm, 7.6 MHz, 40 mm deep (the L11-5v class).
     pub fn linear() -> Self {
         Self {
-            kind: Kind::Linear { width: 38.0 },
+            kind: ProbeKind::Linear { width: 38.0 },
             depth: 40.0,
             frequency: 7.6,
             bandwidth: PULSE,
@@ -289,7 +293,7 @@ impl Probe {
     pub fn phased() -> Self {
         Self {
             bandwidth: PULSE,
-            kind: Kind::Phased { field_of_view: std::f64::consts::FRAC_PI_2 },
+            kind: ProbeKind::Phased { field_of_view: std::f64::consts::FRAC_PI_2 },
             depth: 120.0,
             frequency: 2.7,
             focus: 60.0,

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use egui::{DragValue, RichText, TextEdit, Ui};
 
 use super::controls::grid;
+use crate::exit::Exit;
 use crate::igtl::{OPEN, TrackerState};
 use crate::inputs::Inputs;
 use crate::link::Report;
@@ -13,7 +14,6 @@ use crate::model::{Model, Source, age};
 use crate::pads::Word;
 use crate::panel::{Ask, Desk};
 use crate::style::{self, button};
-use crate::way::Way;
 
 pub(super) fn show(ui: &mut Ui, desk: &mut Desk<'_>) {
     let Desk { model, common, seen } = desk;
@@ -188,6 +188,6 @@ fn file(ui: &mut Ui, model: &mut Model, inputs: &mut Inputs, asks: &mut Vec<Ask>
         ui.label(RichText::new(problem).color(style::WARN));
     }
     if loads {
-        asks.push(Ask::Leave(Way::LoadTrajectory));
+        asks.push(Ask::Leave(Exit::LoadTrajectory));
     }
 }

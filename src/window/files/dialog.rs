@@ -9,12 +9,12 @@ use egui::{Button, Key, RichText, ScrollArea, TextEdit, Ui};
 
 use super::{Files, Purpose};
 use crate::error::message_of;
+use crate::exit::Exit;
 use crate::model::Model;
 use crate::recent;
 use crate::scene::SceneError;
 use crate::settings::Settings;
 use crate::style::{self, button};
-use crate::way::Way;
 
 /// Most names listed of a folder.
 const LISTED: usize = 200;
@@ -118,9 +118,9 @@ pub(crate) fn show(
     model: &mut Model,
     files: &mut Files,
     now: Instant,
-) -> Option<Way> {
+) -> Option<Exit> {
     let mut dialog = files.dialog.take()?;
-    let mut way = None;
+    let mut exit = None;
     dialog.look();
     let mut open = true;
     let title = match dialog.purpose {
@@ -130,20 +130,21 @@ pub(crate) fn show(
     let escape = ctx.input(|input| input.key_pressed(Key::Escape));
     let shown = style::window(title, 48.0).open(&mut open).show(ctx, |ui| {
         ui.set_width(WIDTH);
-        contents(ui, model, (files, &mut way), &mut dialog, now)
+        contents(ui, model, files, &mut exit, &mut dialog, now)
     });
     let is_done = shown.and_then(|s| s.inner).unwrap_or(false);
     if open && !is_done && !escape {
         files.dialog = Some(dialog);
     }
-    way
+    exit
 }
 
 /// Draws the dialog's contents; returns whether it has done its work.
 fn contents(
     ui: &mut Ui,
     model: &mut Model,
-    (files, way): (&mut Files, &mut Option<Way>),
+    files: &mut Files,
+    exit: &mut Option<Exit>,
     dialog: &mut Dialog,
     now: Instant,
 ) -> bool {
@@ -169,7 +170,7 @@ fn contents(
     }
     let outcome = match dialog.purpose {
         Purpose::Save => save(ui, model, files, dialog, confirmed),
-        Purpose::Load => load(ui, model, (files, way), dialog, confirmed, now),
+        Purpose::Load => load(ui, model, files, exit, dialog, confirmed, now),
     };
     let is_done = match outcome {
         Some(Ok(())) => true,
@@ -276,7 +277,8 @@ fn save(
 fn load(
     ui: &mut Ui,
     model: &mut Model,
-    (files, way): (&mut Files, &mut Option<Way>),
+    files: &mut Files,
+    exit: &mut Option<Exit>,
     dialog: &Dialog,
     confirmed: bool,
     now: Instant,
@@ -294,7 +296,7 @@ fn load(
         false => "All of the file, from its beginning (Enter).",
     };
     if button(ui, !opening, "Open scene", text) || confirmed && !opening {
-        *way = Some(Way::Open(path.clone()));
+        *exit = Some(Exit::Open(path.clone()));
     }
     ui.separator();
     let tables: Vec<String> = Settings::TABLES.iter().map(|table| format!("[{table}]")).collect();

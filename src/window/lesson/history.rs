@@ -58,7 +58,7 @@ impl Page {
 }
 
 /// Draws the page for a task of a scene, by the names of both; returns false where it is to be closed.
-pub(super) fn show(ui: &mut Ui, page: &mut Page, (scene, task): (&str, &str)) -> bool {
+pub(super) fn show(ui: &mut Ui, page: &mut Page, scene: &str, task: &str) -> bool {
     let mut stays = true;
     ui.horizontal(|ui| {
         stays = !button(ui, "Back", "To the tasks");

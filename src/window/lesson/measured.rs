@@ -110,7 +110,7 @@ pub(super) fn show(ui: &mut Ui, model: &Model, measured: &mut Measured, unit: Un
             let Offer { name, value } = &offers[at];
             format!("{name}: {value:.1} {}", unit.word())
         };
-        style::choice(ui, ("measured", 200.0), &mut at, &all, said);
+        style::choice(ui, "measured", 200.0, &mut at, &all, said);
     });
     if at != was {
         measured.chosen.clone_from(&offers[at].name);
@@ -124,18 +124,18 @@ mod tests {
     use glam::{DAffine3, DVec2, dvec2};
 
     use super::*;
-    use crate::model::calipers::Kind;
+    use crate::model::calipers::CaliperKind;
     use crate::model::sheet::Moment;
     use crate::settings::Exam;
 
-    fn mark(letter: char, kind: Kind, label: &str, points: &[DVec2]) -> Mark {
+    fn mark(letter: char, kind: CaliperKind, label: &str, points: &[DVec2]) -> Mark {
         let caliper = Caliper { label: label.to_owned(), ..Caliper::new(kind, points.to_vec()) };
         let of = Moment { pose: DAffine3::IDENTITY, seconds: 0.0 };
         Mark { letter, what: What::Caliper(caliper), of }
     }
 
     fn length(letter: char, label: &str, mm: f64) -> Mark {
-        mark(letter, Kind::Distance, label, &[DVec2::ZERO, DVec2::X * mm])
+        mark(letter, CaliperKind::Distance, label, &[DVec2::ZERO, DVec2::X * mm])
     }
 
     fn offered(marks: &Marks, unit: Unit) -> Vec<(String, f64)> {
@@ -157,9 +157,9 @@ mod tests {
             kept: vec![length('A', "CBD", 4.0), length('B', "CBD", 5.0)],
             shown: vec![
                 length('A', "", 30.0),
-                mark('B', Kind::Ellipse, "cyst", &ellipse),
-                mark('C', Kind::Angle, "", &ellipse),
-                mark('D', Kind::Trace, "", &square),
+                mark('B', CaliperKind::Ellipse, "cyst", &ellipse),
+                mark('C', CaliperKind::Angle, "", &ellipse),
+                mark('D', CaliperKind::Trace, "", &square),
             ],
         };
         let names = |unit| -> Vec<String> {

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-pub use insonify_lab::exam::Kind;
+pub use insonify_lab::exam::CaliperKind;
 use insonify_lab::exam::Measured;
 
 /// Result of a measurement.
@@ -33,11 +33,11 @@ pub enum Reading {
     },
 }
 
-/// A measurement and its points, as many as [`Kind::points`] says.
+/// A measurement and its points, as many as [`CaliperKind::points`] says.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Caliper {
     /// Kind of the measurement.
-    pub kind: Kind,
+    pub kind: CaliperKind,
     /// Its points, mm. The third point of an ellipse lies on its second axis.
     pub points: Vec<DVec2>,
     /// Its name, or an empty text.
@@ -49,7 +49,7 @@ impl Caliper {
     ///
     /// # Panics
     /// When there are not as many points as `kind` takes: of a trace, three.
-    pub fn new(kind: Kind, points: Vec<DVec2>) -> Self {
+    pub fn new(kind: CaliperKind, points: Vec<DVec2>) -> Self {
         assert!(kind.points().map_or(points.len() >= 3, |count| points.len() == count));
         let mut made = Self { kind, points, label: String::new() };
         made.settle();
@@ -60,7 +60,7 @@ impl Caliper {
     pub fn drag(&mut self, point: usize, to: DVec2) {
         let width = self.half_width();
         self.points[point] = to;
-        if self.kind == Kind::Ellipse && point < 2 {
+        if self.kind == CaliperKind::Ellipse && point < 2 {
             self.points[2] = self.centre() + width * self.normal();
         }
         self.settle();
@@ -77,8 +77,8 @@ impl Caliper {
     pub fn reading(&self) -> Reading {
         let p = &self.points;
         match self.kind {
-            Kind::Distance => Reading::Distance(p[0].distance(p[1])),
-            Kind::Ellipse => {
+            CaliperKind::Distance => Reading::Distance(p[0].distance(p[1])),
+            CaliperKind::Ellipse => {
                 let [a, b] = [p[0].distance(p[1]) / 2.0, self.half_width().abs()];
                 Reading::Ellipse {
                     axes: [2.0 * a, 2.0 * b],
@@ -86,13 +86,13 @@ impl Caliper {
                     area: PI * a * b,
                 }
             }
-            Kind::Angle => {
+            CaliperKind::Angle => {
                 let arms = [p[0] - p[1], p[2] - p[1]];
                 let is_drawn = arms.iter().all(|arm| arm.length() > 0.0);
                 let angle = if is_drawn { arms[0].angle_to(arms[1]) } else { 0.0 };
                 Reading::Angle(angle.abs().to_degrees())
             }
-            Kind::Trace => {
+            CaliperKind::Trace => {
                 let next = |i: usize| p[(i + 1) % p.len()];
                 let sides = p.iter().enumerate().map(|(i, point)| (*point, next(i)));
                 let (around, twice) = sides.fold((0.0, 0.0), |(around, twice), (a, b)| {
@@ -114,7 +114,7 @@ impl Caliper {
                 (out.circumference, out.area) = (Some(circumference), Some(area));
             }
         }
-        if self.kind == Kind::Trace {
+        if self.kind == CaliperKind::Trace {
             out.outline.clone_from(&self.points);
         }
         out
@@ -139,14 +139,14 @@ impl Caliper {
 
     fn half_width(&self) -> f64 {
         match self.kind {
-            Kind::Ellipse => (self.points[2] - self.centre()).dot(self.normal()),
-            Kind::Distance | Kind::Angle | Kind::Trace => 0.0,
+            CaliperKind::Ellipse => (self.points[2] - self.centre()).dot(self.normal()),
+            CaliperKind::Distance | CaliperKind::Angle | CaliperKind::Trace => 0.0,
         }
     }
 
     /// Puts the third point of an ellipse onto its second axis.
     fn settle(&mut self) {
-        if self.kind == Kind::Ellipse {
+        if self.kind == CaliperKind::Ellipse {
             self.points[2] = self.centre() + self.half_width() * self.normal();
         }
     }
@@ -180,13 +180,13 @@ mod tests {
 
     use glam::{DVec2, dvec2};
 
-    use super::{Caliper, Kind, Reading, circumference};
+    use super::{Caliper, CaliperKind, Reading, circumference};
 
     fn close(a: f64, b: f64) {
         assert!((a - b).abs() <= 1e-12 * b.abs().max(1.0), "{a} {b}");
     }
 
-    fn made(kind: Kind, points: &[[f64; 2]]) -> Caliper {
+    fn made(kind: CaliperKind, points: &[[f64; 2]]) -> Caliper {
         Caliper::new(kind, points.iter().map(|&p| DVec2::from(p)).collect())
     }
 
@@ -198,7 +198,7 @@ mod tests {
             ([[-1.0, 2.0], [2.0, 6.0]], 5.0),
             ([[1.0, 1.0], [1.0, 1.0]], 0.0),
         ] {
-            let Reading::Distance(mm) = made(Kind::Distance, &points).reading() else {
+            let Reading::Distance(mm) = made(CaliperKind::Distance, &points).reading() else {
                 panic!("a distance");
             };
             close(mm, expected);
@@ -216,7 +216,7 @@ mod tests {
             // On both sides of the arc tangent's branch cut.
             ([[-1.0, 0.1], [0.0, 0.0], [-1.0, -0.1]], 2.0 * 0.1_f64.atan().to_degrees()),
         ] {
-            let Reading::Angle(degrees) = made(Kind::Angle, &points).reading() else {
+            let Reading::Angle(degrees) = made(CaliperKind::Angle, &points).reading() else {
                 panic!("an angle");
             };
             close(degrees, expected);
@@ -226,7 +226,7 @@ mod tests {
     #[test]
     fn an_ellipse_is_measured_along_its_axes() {
         // The third point need not lie on the second axis: only its distance from the first axis counts.
-        let drawn = made(Kind::Ellipse, &[[10.0, 20.0], [10.0, 50.0], [18.0, 24.0]]);
+        let drawn = made(CaliperKind::Ellipse, &[[10.0, 20.0], [10.0, 50.0], [18.0, 24.0]]);
         assert_eq!(drawn.points[2], dvec2(18.0, 35.0));
         let Reading::Ellipse { axes, circumference, area } = drawn.reading() else {
             panic!("an ellipse");
@@ -253,11 +253,11 @@ mod tests {
 
     #[test]
     fn a_trace_is_measured_along_its_sides() {
-        let square = made(Kind::Trace, &[[1.0, 1.0], [1.0, 4.0], [4.0, 4.0], [4.0, 1.0]]);
+        let square = made(CaliperKind::Trace, &[[1.0, 1.0], [1.0, 4.0], [4.0, 4.0], [4.0, 1.0]]);
         assert_eq!(square.reading(), Reading::Trace { circumference: 12.0, area: 9.0 });
         let circle: Vec<DVec2> =
             (0..2000).map(|i| 25.0 * DVec2::from_angle(PI * f64::from(i) / 1000.0)).collect();
-        let measured = Caliper::new(Kind::Trace, circle).measured();
+        let measured = Caliper::new(CaliperKind::Trace, circle).measured();
         assert!((measured.area.expect("closed") / (625.0 * PI) - 1.0).abs() < 1e-5);
         assert!((measured.circumference.expect("closed") / (50.0 * PI) - 1.0).abs() < 1e-5);
         assert_eq!(measured.outline.len(), 2000);

@@ -65,7 +65,8 @@ impl Hold {
     /// the depth, turns are those of the hand. None for a probe that is not near the skin.
     fn moved(
         &mut self,
-        (skin, probe): (&Skin, &Probe),
+        skin: &Skin,
+        probe: &Probe,
         pose: &DAffine3,
         axis: Axis,
         amount: f64,
@@ -205,7 +206,7 @@ impl Model {
     ) -> Option<DAffine3> {
         let (pose, probe) = (self.pose, self.settings.probe.clone());
         let (skin, hold) = self.skin(now).filter(|(_, hold)| hold.stays)?;
-        hold.moved((&skin, &probe), &pose, axis, amount)
+        hold.moved(&skin, &probe, &pose, axis, amount)
     }
 
     fn slide(

@@ -234,13 +234,13 @@ mod tests {
 
     use super::{Aim, ROWS, Span, Strip, nearest_line};
     use crate::picture::{Pixels, Sector};
-    use crate::probe::{Kind, Probe};
+    use crate::probe::{Probe, ProbeKind};
 
     const SECTOR: Sector = Sector { left: -20.0, top: 0.0, pitch: 0.5 };
 
     fn probe() -> Probe {
         Probe {
-            kind: Kind::Linear { width: 40.0 },
+            kind: ProbeKind::Linear { width: 40.0 },
             scanlines: 40,
             depth: 50.0,
             ..Probe::PRESETS[0].1()

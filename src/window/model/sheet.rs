@@ -4,20 +4,20 @@ mod mark;
 
 use glam::DVec2;
 
-use super::calipers::{Caliper, Kind};
+use super::calipers::{Caliper, CaliperKind};
 pub use mark::{Mark, Marks, Moment, Note, What};
 
 /// The pointer's tool on the image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tool {
     /// Makes a measurement.
-    Measure(Kind),
+    Measure(CaliperKind),
     /// Places a text.
     Note,
 }
 
 /// The tool whose points are as many as the user likes.
-const TRACE: Tool = Tool::Measure(Kind::Trace);
+const TRACE: Tool = Tool::Measure(CaliperKind::Trace);
 /// Most points of an outline.
 const MOST: usize = 4096;
 
@@ -246,7 +246,7 @@ impl Sheet {
         };
         match points.len() < 3 {
             true => self.draft = None,
-            false => self.finish(What::Caliper(Caliper::new(Kind::Trace, points))),
+            false => self.finish(What::Caliper(Caliper::new(CaliperKind::Trace, points))),
         }
     }
 

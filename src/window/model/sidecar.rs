@@ -87,7 +87,7 @@ mod tests {
     use glam::{DAffine3, DVec2, DVec3, dvec2};
     use serde_json::json;
 
-    use super::super::calipers::{Caliper, Kind};
+    use super::super::calipers::{Caliper, CaliperKind};
     use super::super::sheet::{Mark, Marks, Moment, Note, What};
     use super::{marks, stem};
     use crate::sim::facts::pose;
@@ -120,7 +120,7 @@ mod tests {
             Mark {
                 letter: 'A',
                 what: What::Caliper(caliper(
-                    Kind::Distance,
+                    CaliperKind::Distance,
                     &[DVec2::ZERO, dvec2(3.0, 4.0)],
                     "BPD",
                 )),

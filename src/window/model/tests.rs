@@ -204,13 +204,13 @@ fn every_change_is_a_new_revision_and_nothing_else_is() {
 
 #[test]
 fn marks_leave_an_image_that_goes_live_and_named_ones_stay_for_the_worksheet() {
-    use super::calipers::Kind;
+    use super::calipers::CaliperKind;
     use super::sheet::Tool;
     let now = Instant::now();
     let mut model = model(now);
     let measure = |model: &mut Model, name: &str| {
         let moment = super::sheet::Moment { pose: model.pose, seconds: 0.0 };
-        model.sheet.take(Some(Tool::Measure(Kind::Distance)));
+        model.sheet.take(Some(Tool::Measure(CaliperKind::Distance)));
         // Away from the marks that are there, which the pointer would take.
         let depth = 10.0 * (1 + model.sheet.all().iter().count()) as f64;
         model.sheet.press(glam::dvec2(0.0, depth), 1.0, moment);

@@ -4,7 +4,7 @@ use glam::{DAffine3, DVec2, DVec3};
 
 use super::camera::Camera;
 use super::hold::EDGE_ON;
-use crate::probe::{Kind, Probe};
+use crate::probe::{Probe, ProbeKind};
 use crate::scene::palette::{self, Show};
 use crate::scene::{Orientation, Scene};
 use crate::sim::view3d::CameraView;
@@ -150,11 +150,11 @@ impl View3d {
 /// A camera somewhat above and to the side, with the probe and all of the fan in view.
 fn overview(pose: &DAffine3, probe: &Probe) -> Camera {
     let half_width = match probe.kind {
-        Kind::Convex { radius, field_of_view } => {
+        ProbeKind::Convex { radius, field_of_view } => {
             (radius + probe.depth) * (field_of_view / 2.0).sin()
         }
-        Kind::Phased { field_of_view } => probe.depth * (field_of_view / 2.0).sin(),
-        Kind::Linear { width } => width / 2.0,
+        ProbeKind::Phased { field_of_view } => probe.depth * (field_of_view / 2.0).sin(),
+        ProbeKind::Linear { width } => width / 2.0,
     };
     // The probe's head is to be seen, too.
     let above = 0.2 * probe.depth + 20.0;

@@ -115,7 +115,7 @@ impl Open {
         let watch = Watch::new(waker(plan.proxy.clone())).map_err(ViewError::Thread)?;
         watch.set(&plan.options.file);
         recent::add(&plan.options.file);
-        Ok((Self::with(session, model, state, (input, window), watch), log))
+        Ok((Self::with(session, model, state, input, window, watch), log))
     }
 
     /// The same window with another simulation on a new device; `problem` is shown in it. The log is the new
@@ -157,7 +157,7 @@ impl Open {
         let log = device.validation_log();
         let session = plan.session(device, &window, &model)?;
         window.request_redraw();
-        let made = Self::with(session, model, state, (input, window), watch);
+        let made = Self::with(session, model, state, input, window, watch);
         let made = Self { title, opening, saved, held, ..made };
         Ok((made, log))
     }
@@ -167,7 +167,8 @@ impl Open {
         session: Session,
         model: Model,
         state: State,
-        (input, window): (egui_winit::State, Arc<Window>),
+        input: egui_winit::State,
+        window: Arc<Window>,
         watch: Watch,
     ) -> Self {
         Self {

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use super::{Open, Plan};
+use crate::exit::Exit;
 use crate::inputs::name;
 use crate::leaving;
 use crate::naming;
@@ -11,7 +12,6 @@ use crate::opening::{Opened, Opening, Purpose};
 use crate::panel::Panel;
 use crate::planes;
 use crate::recent;
-use crate::way::Way;
 
 /// Reason for which no scene is opened.
 const STOPPED: &str = "The simulation stands still. Start it again first, then open the scene.";
@@ -149,8 +149,8 @@ impl Open {
         let is_scene = path.extension().is_some_and(|extension| extension == "toml");
         match is_scene {
             true => {
-                let way = Way::Open(path.to_owned());
-                leaving::leave(way, &mut self.model, &mut self.state, Instant::now());
+                let exit = Exit::Open(path.to_owned());
+                leaving::leave(exit, &mut self.model, &mut self.state, Instant::now());
             }
             false => {
                 let text = "is no scene file (.toml); `insonify import` makes one from meshes and segmentations";

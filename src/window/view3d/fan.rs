@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use super::Place;
 use crate::look::Pictured;
-use crate::probe::{Kind, Probe};
+use crate::probe::{Probe, ProbeKind};
 use crate::style;
 
 /// Points along each arc of the outline.
@@ -48,9 +48,9 @@ pub(crate) fn outline(probe: &Probe) -> Vec<DVec3> {
         std::iter::once(start).chain(far).chain([end]).collect()
     };
     match probe.kind {
-        Kind::Convex { radius, field_of_view } => fan(radius, field_of_view),
-        Kind::Phased { field_of_view } => fan(0.0, field_of_view),
-        Kind::Linear { width } => {
+        ProbeKind::Convex { radius, field_of_view } => fan(radius, field_of_view),
+        ProbeKind::Phased { field_of_view } => fan(0.0, field_of_view),
+        ProbeKind::Linear { width } => {
             let corner = |x: f64, z: f64| DVec3::new(x * width / 2.0, 0.0, z);
             let depth = probe.depth;
             vec![corner(1.0, 0.0), corner(1.0, depth), corner(-1.0, depth), corner(-1.0, 0.0)]

@@ -93,10 +93,10 @@ pub(super) fn meshes(
         }
         let tissue = tissues.index(&format!("{path}.tissue"), &keys.tissue)?;
         let surface = surfaces(stated, tissues.get(tissue));
-        let playing = playing::read(document, (stated, &name), &path, &mut shelf, warnings)?;
+        let playing = playing::read(document, stated, &name, &path, &mut shelf, warnings)?;
         let shapes = match &playing {
             Some(playing) => playing.meshes.iter().map(Played::shapes).collect(),
-            None => vec![shelf.shapes(document, (stated, &name), &path, warnings)?],
+            None => vec![shelf.shapes(document, stated, &name, &path, warnings)?],
         };
         shelf.bounded(document, &path)?;
         let rest = placed(document, &path, stated)?;

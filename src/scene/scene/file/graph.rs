@@ -8,7 +8,7 @@ use super::anatomy::Anatomy;
 use super::document::Document;
 use super::error::SceneError;
 use super::motion::{self, MotionKeys, PERIOD};
-use super::nodes::{Entry, Kind, NodeKeys, depths, in_order, of_kind, parents};
+use super::nodes::{Entry, NodeKeys, TableKind, depths, in_order, of_kind, parents};
 use super::placing::placed;
 use super::playing::Following;
 use super::shelf::MeshKeys;
@@ -46,10 +46,10 @@ pub(super) fn build(
     file: Tables<'_>,
     anatomy: &mut Anatomy,
 ) -> Result<Graph, SceneError> {
-    let nodes = of_kind(file.group, |_| Kind::Group)
-        .chain(of_kind(file.transform, Kind::Transform))
-        .chain(of_kind(file.selector, Kind::Selector))
-        .chain(of_kind(file.mesh, Kind::Mesh));
+    let nodes = of_kind(file.group, |_| TableKind::Group)
+        .chain(of_kind(file.transform, TableKind::Transform))
+        .chain(of_kind(file.selector, TableKind::Selector))
+        .chain(of_kind(file.mesh, TableKind::Mesh));
     let entries = in_order(document, nodes)?;
     let parents = parents(document, &entries)?;
     let depths = depths(document, &entries, &parents)?;
@@ -63,12 +63,12 @@ pub(super) fn build(
     let mut choices = Choices::default();
     for (e, entry) in entries.iter().enumerate() {
         match entry.kind {
-            Kind::Selector(number) => {
+            TableKind::Selector(number) => {
                 let stated = &file.selector[number].stated;
                 family.choose(e, stated, number, anatomy, &mut choices)?;
             }
-            Kind::Mesh(i) if switched(anatomy, i).is_some() => family.under_selector(e)?,
-            Kind::Group | Kind::Transform(_) | Kind::Mesh(_) => {}
+            TableKind::Mesh(i) if switched(anatomy, i).is_some() => family.under_selector(e)?,
+            TableKind::Group | TableKind::Transform(_) | TableKind::Mesh(_) => {}
         }
     }
     group_played(file, anatomy);
@@ -77,7 +77,7 @@ pub(super) fn build(
     order.sort_by_key(|&e| depths[e]);
     // A mesh without a parent stays where it is, unless its file moves it.
     let stays = |&e: &usize| match entries[e].kind {
-        Kind::Mesh(i) => parents[e].is_none() && anatomy.placed[i].playing.is_none(),
+        TableKind::Mesh(i) => parents[e].is_none() && anatomy.placed[i].playing.is_none(),
         _ => false,
     };
     order.retain(|e| !stays(e));
@@ -101,7 +101,7 @@ pub(super) fn build(
             alternative: choices.alternatives.get(&e).copied(),
             kind,
         });
-        if let Kind::Mesh(i) = entries[e].kind {
+        if let TableKind::Mesh(i) = entries[e].kind {
             let placed = &mut anatomy.placed[i];
             if let Some(playing) = placed.playing.take() {
                 playing.grow(&mut graph, node, placed.instances.start);
@@ -166,7 +166,7 @@ impl Family<'_> {
     /// Fails unless the mesh with keyframes at entry `e` is the child of a selector.
     fn under_selector(&self, e: usize) -> Result<(), SceneError> {
         let kind = self.parents[e].map(|p| self.entries[p].kind);
-        if matches!(kind, Some(Kind::Selector(_))) {
+        if matches!(kind, Some(TableKind::Selector(_))) {
             return Ok(());
         }
         Err(self.document.fail(
@@ -196,7 +196,7 @@ impl Family<'_> {
         for &child in &self.children[e] {
             let entry = &self.entries[child];
             let own = match entry.kind {
-                Kind::Mesh(i) => switched(anatomy, i),
+                TableKind::Mesh(i) => switched(anatomy, i),
                 _ => None,
             };
             let Some(instance) = own else {
@@ -273,19 +273,19 @@ impl Family<'_> {
         choices: &mut Choices,
     ) -> Result<NodeKind, SceneError> {
         Ok(match self.entries[e].kind {
-            Kind::Group => NodeKind::Group,
-            Kind::Transform(i) => {
+            TableKind::Group => NodeKind::Group,
+            TableKind::Transform(i) => {
                 let stated = &self.file.transform[i].stated;
                 NodeKind::Transform {
                     rest: placed(self.document, &self.entries[e].path, stated)?,
                     motion: motion::motion(self.document, stated, &self.entries[e].path)?,
                 }
             }
-            Kind::Selector(_) => {
+            TableKind::Selector(_) => {
                 let sequence = choices.sequences.remove(&e);
                 NodeKind::Selector(sequence.expect("every selector has chosen"))
             }
-            Kind::Mesh(i) => {
+            TableKind::Mesh(i) => {
                 let placed = &anatomy.placed[i];
                 let (rest, instance) = (placed.rest, placed.instances.start);
                 match placed.playing {

@@ -25,7 +25,7 @@ const LONGEST: f64 = 3600.0;
 
 words! {
     /// Kind of a motion.
-    pub enum Kind {
+    pub enum MotionKind {
         /// To and fro.
         Sine = "sine",
         /// Round and round.
@@ -69,7 +69,7 @@ group! {
     /// Motion of a transform.
     pub struct MotionKeys in "transform.motion" {
         /// Kind of the motion.
-        kind: Kind = Kind::Sine, Facts::word::<Kind>().required();
+        kind: MotionKind = MotionKind::Sine, Facts::word::<MotionKind>().required();
         /// Time of one oscillation or turn. Sine and orbit.
         period: Option<f64> = None, PERIOD.by_default("required");
         /// Amplitude of the shift. Sine and fetal, which need this or `rotate` (sine: or `scale`).
@@ -98,8 +98,8 @@ group! {
 }
 
 /// Keys of some kinds of motion only, with these kinds; `kind` and `rate` belong to all.
-const OWN: [(&str, &[Kind]); 12] = {
-    use Kind::{Fetal, File, Orbit, Sine};
+const OWN: [(&str, &[MotionKind]); 12] = {
+    use MotionKind::{Fetal, File, Orbit, Sine};
     [
         ("period", &[Sine, Orbit]),
         ("phase", &[Sine, Orbit, File]),
@@ -149,7 +149,7 @@ pub(super) fn motion(
     parts.fit()?;
     let translation = DVec3::from(keys.translate);
     Ok(match keys.kind {
-        Kind::Sine => {
+        MotionKind::Sine => {
             parts.moves()?;
             Motion::Sine {
                 clock: clock(stated, "motion.", parts.need("period", keys.period)?),
@@ -158,14 +158,14 @@ pub(super) fn motion(
                 scale: keys.scale.into(),
             }
         }
-        Kind::Orbit => {
+        MotionKind::Orbit => {
             parts.need("rotate", parts.has("rotate").then_some(()))?;
             Motion::Orbit {
                 clock: clock(stated, "motion.", parts.need("period", keys.period)?),
                 turn: parts.turn()?,
             }
         }
-        Kind::Fetal => {
+        MotionKind::Fetal => {
             parts.moves()?;
             Motion::Fetal(Fetal {
                 seed: keys.seed,
@@ -176,7 +176,7 @@ pub(super) fn motion(
                 rate: stated.get::<Updates>("motion.").rate,
             })
         }
-        Kind::File => {
+        MotionKind::File => {
             let file = parts.need("file", keys.file.as_ref())?;
             let folder = document.source.path.parent();
             let full = folder.map_or_else(|| file.into(), |p| p.join(file));
@@ -215,7 +215,7 @@ impl Parts<'_> {
 
     /// Refuses keys of another kind of motion.
     fn fit(&self) -> Result<(), SceneError> {
-        let fits = |kinds: &[Kind]| kinds.contains(&self.keys.kind);
+        let fits = |kinds: &[MotionKind]| kinds.contains(&self.keys.kind);
         let Some((key, _)) = OWN.iter().find(|(key, kinds)| self.has(key) && !fits(kinds)) else {
             return Ok(());
         };
@@ -242,7 +242,7 @@ impl Parts<'_> {
     fn moves(&self) -> Result<(), SceneError> {
         let moves = ["translate", "rotate", "scale"].iter().any(|key| self.has(key));
         let needed = match self.keys.kind {
-            Kind::Sine => "translate`, `rotate` or `scale",
+            MotionKind::Sine => "translate`, `rotate` or `scale",
             _ => "translate` or `rotate",
         };
         self.need(needed, moves.then_some(()))

@@ -23,12 +23,12 @@ pub(super) struct Entry<'f> {
     pub path: String,
     pub name: &'f str,
     pub parent: Option<&'f str>,
-    pub kind: Kind,
+    pub kind: TableKind,
 }
 
 /// Kind, with the number of the table among those of its kind.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum TableKind {
     Group,
     Transform(usize),
     Selector(usize),
@@ -38,7 +38,7 @@ pub(super) enum Kind {
 /// Tables that are nodes of one kind.
 pub(super) fn of_kind<'f, K: Keys>(
     tables: &'f [Table<K>],
-    kind: fn(usize) -> Kind,
+    kind: fn(usize) -> TableKind,
 ) -> impl Iterator<Item = Entry<'f>> {
     tables.iter().enumerate().map(move |(i, Table { stated, .. })| Entry {
         path: format!("{}.{i}", K::TABLE),
@@ -76,7 +76,7 @@ pub(super) fn parents(
     entries: &[Entry<'_>],
 ) -> Result<Vec<Option<usize>>, SceneError> {
     let by_name: HashMap<_, _> = entries.iter().zip(0..).map(|(e, i)| (e.name, i)).collect();
-    let holds = |e: &Entry| !matches!(e.kind, Kind::Mesh(_));
+    let holds = |e: &Entry| !matches!(e.kind, TableKind::Mesh(_));
     let find = |entry: &Entry, parent: &str| {
         let at = format!("{}.parent", entry.path);
         match by_name.get(parent) {

@@ -71,7 +71,7 @@ pub(super) fn placed(
 ) -> Result<DAffine3, SceneError> {
     let Some(rows) = stated.get::<Affine>("").matrix else { return Ok(placement(stated, "")) };
     let path = format!("{path}.matrix");
-    let placement = affine(document, &path, rows, (stated, ""))?;
+    let placement = affine(document, &path, rows, stated, "")?;
     let (m, shifts) = (placement.matrix3, placement.translation.to_array());
     let lengths = [m.x_axis, m.y_axis, m.z_axis].map(DVec3::length);
     let volume = m.determinant() / lengths.iter().product::<f64>();
@@ -106,7 +106,8 @@ pub(super) fn affine(
     document: &Document<'_>,
     path: &str,
     rows: [f64; 16],
-    (stated, below): (&Stated, &str),
+    stated: &Stated,
+    below: &str,
 ) -> Result<DAffine3, SceneError> {
     let fail = |why: &str, remedy| Err(document.fail(path, why, remedy));
     if ["scale", "rotate", "translate"].iter().any(|key| stated.has(&format!("{below}{key}"))) {

@@ -50,7 +50,8 @@ pub(super) struct Played {
 /// Reads the animation that the table of the mesh `name`, at `path` in the file, names.
 pub(super) fn read(
     document: &Document<'_>,
-    (stated, name): (&Stated, &str),
+    stated: &Stated,
+    name: &str,
     path: &str,
     shelf: &mut Shelf,
     warnings: &mut Vec<Issue>,

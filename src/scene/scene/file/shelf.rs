@@ -108,7 +108,8 @@ impl Shelf {
     pub fn shapes(
         &mut self,
         document: &Document<'_>,
-        (stated, name): (&Stated, &str),
+        stated: &Stated,
+        name: &str,
         path: &str,
         warnings: &mut Vec<Issue>,
     ) -> Result<Shapes, SceneError> {
@@ -144,7 +145,7 @@ impl Shelf {
                 Files::Keyframes(files.iter().map(|file| folder.join(file)).collect())
             }
             (None, None) => {
-                let mesh = built(document, (stated, name), path)?;
+                let mesh = built(document, stated, name, path)?;
                 return Ok(Shapes {
                     name: name.to_owned(),
                     mesh: self.add(name, mesh),
@@ -271,7 +272,8 @@ pub(super) fn options(keys: &MeshKeys) -> Options {
 /// A built-in shape, with none of the keys that files take.
 fn built(
     document: &Document<'_>,
-    (stated, name): (&Stated, &str),
+    stated: &Stated,
+    name: &str,
     path: &str,
 ) -> Result<Mesh, SceneError> {
     let capped = stated.get::<MeshKeys>("").cap_openings;

@@ -16,7 +16,7 @@ use crate::settings::{Form, Words, group, suggest, words};
 
 words! {
     /// Kinds of tasks.
-    pub enum Kind {
+    pub enum TaskKind {
         /// A view to reach.
         View = "view",
         /// Structures to show.
@@ -47,7 +47,7 @@ group! {
         name: String = String::new(), Facts::of(Form::Text).required().limits("not empty, once in the file");
         /// A view to reach, structures to show, a measurement to take, or a question to answer. Each takes the keys
         /// that are said below to be its own, and those of every task: `name`, `text`, `hints`.
-        kind: Kind = Kind::View, Facts::word::<Kind>();
+        kind: TaskKind = TaskKind::View, Facts::word::<TaskKind>();
         /// What the learner is to do, or the question.
         text: String = String::new(), Facts::of(Form::Text).required().limits("not empty");
         /// Hints, which the guide gives one after the other.
@@ -88,24 +88,24 @@ group! {
 }
 
 /// Keys of one kind alone or of two; the others are every task's.
-const OWN: [(&str, &[Kind]); 17] = [
-    ("pose", &[Kind::View]),
-    ("position", &[Kind::View]),
-    ("direction", &[Kind::View]),
-    ("lateral", &[Kind::View]),
-    ("distance", &[Kind::View]),
-    ("plane_angle", &[Kind::View]),
-    ("turn", &[Kind::View]),
-    ("hold", &[Kind::View]),
-    ("contact", &[Kind::View, Kind::Show]),
-    ("mesh", &[Kind::Show, Kind::Measure]),
-    ("area", &[Kind::Show]),
-    ("value", &[Kind::Measure]),
-    ("unit", &[Kind::Measure]),
-    ("size", &[Kind::Measure]),
-    ("tolerance", &[Kind::Measure]),
-    ("choices", &[Kind::Question]),
-    ("answer", &[Kind::Question]),
+const OWN: [(&str, &[TaskKind]); 17] = [
+    ("pose", &[TaskKind::View]),
+    ("position", &[TaskKind::View]),
+    ("direction", &[TaskKind::View]),
+    ("lateral", &[TaskKind::View]),
+    ("distance", &[TaskKind::View]),
+    ("plane_angle", &[TaskKind::View]),
+    ("turn", &[TaskKind::View]),
+    ("hold", &[TaskKind::View]),
+    ("contact", &[TaskKind::View, TaskKind::Show]),
+    ("mesh", &[TaskKind::Show, TaskKind::Measure]),
+    ("area", &[TaskKind::Show]),
+    ("value", &[TaskKind::Measure]),
+    ("unit", &[TaskKind::Measure]),
+    ("size", &[TaskKind::Measure]),
+    ("tolerance", &[TaskKind::Measure]),
+    ("choices", &[TaskKind::Question]),
+    ("answer", &[TaskKind::Question]),
 ];
 
 /// The table of a task, and where it stands.
@@ -150,7 +150,7 @@ pub(super) fn build(
             return Err(place.fail("name", message, "give one another name"));
         }
         let strange =
-            |(key, kinds): &&(&str, &[Kind])| place.has(key) && !kinds.contains(&keys.kind);
+            |(key, kinds): &&(&str, &[TaskKind])| place.has(key) && !kinds.contains(&keys.kind);
         if let Some((key, kinds)) = OWN.iter().find(strange) {
             let message = format!("`{key}` does not belong to a task of kind {}", keys.kind.word());
             let kinds: Vec<_> = kinds.iter().map(|kind| kind.word()).collect();
@@ -158,10 +158,10 @@ pub(super) fn build(
             return Err(place.fail(key, message, remedy));
         }
         let goal = match keys.kind {
-            Kind::View => Goal::View(target(&place, &keys, poses)?),
-            Kind::Show => Goal::Show(cover(&place, &keys, instances)?),
-            Kind::Measure => Goal::Measure(measurement(&place, &keys, meshes, instances)?),
-            Kind::Question => Goal::Question(question(&place, &keys)?),
+            TaskKind::View => Goal::View(target(&place, &keys, poses)?),
+            TaskKind::Show => Goal::Show(cover(&place, &keys, instances)?),
+            TaskKind::Measure => Goal::Measure(measurement(&place, &keys, meshes, instances)?),
+            TaskKind::Question => Goal::Question(question(&place, &keys)?),
         };
         let start = keys.start.as_deref().map(|name| named(&place, "start", name, poses));
         let start = start.transpose()?.map(|pose| pose.world_from_probe);

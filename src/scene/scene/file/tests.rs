@@ -6,7 +6,7 @@ use crate::settings::units::DURATION;
 use std::path::PathBuf;
 
 use super::*;
-use crate::probe::Kind;
+use crate::probe::ProbeKind;
 
 pub(super) struct Case {
     pub folder: tempfile::TempDir,
@@ -93,7 +93,7 @@ fn a_whole_scene_is_understood() {
     assert!(warnings.is_empty(), "{warnings:?}");
     assert_eq!(scene.tissues[scene.background].name, "fat");
     assert_eq!(scene.probe.depth, 120.0);
-    assert!(matches!(scene.probe.kind, Kind::Convex { radius, .. } if radius == 50.0));
+    assert!(matches!(scene.probe.kind, ProbeKind::Convex { radius, .. } if radius == 50.0));
     let pose = scene.world_from_probe;
     assert_eq!(pose.transform_vector3(glam::DVec3::X), glam::DVec3::X);
     assert_eq!(pose.transform_point3(glam::DVec3::Z), glam::DVec3::new(10.0, 0.0, -4.0));

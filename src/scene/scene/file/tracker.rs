@@ -71,7 +71,7 @@ fn transform(document: &Document<'_>, stated: &Stated, name: &str) -> Result<DAf
         return Ok(placement(stated, &below));
     };
     let path = format!("tracker.{below}matrix");
-    let matrix = affine(document, &path, rows, (stated, &below))?;
+    let matrix = affine(document, &path, rows, stated, &below)?;
     rigid(matrix).map_err(|why| {
         let message = format!("this is no rigid transform: {why}");
         let remedy = "write rotation and shift in mm, without scale, row by row";

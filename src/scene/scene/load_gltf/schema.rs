@@ -2,10 +2,10 @@
 
 use std::f64::consts::PI;
 
-use Kind::{Bool, Id, Int, IntIn, List, Map, Num, Object, Text, TextIn, Uri};
+use ValueKind::{Bool, Id, Int, IntIn, List, Map, Num, Object, Text, TextIn, Uri};
 
 /// Kind of a property.
-pub(super) enum Kind {
+pub(super) enum ValueKind {
     Bool,
     Text,
     Uri,
@@ -17,20 +17,20 @@ pub(super) enum Kind {
     Id(&'static str),
     Object(&'static Table),
     /// Elements: least and largest number, and whether all differ.
-    List(&'static Kind, usize, usize, bool),
+    List(&'static ValueKind, usize, usize, bool),
     /// Any keys.
-    Map(&'static Kind),
+    Map(&'static ValueKind),
 }
 
 /// Properties of an object: name, whether required, kind.
-pub(super) type Table = [(&'static str, bool, Kind)];
+pub(super) type Table = [(&'static str, bool, ValueKind)];
 
 const MANY: usize = usize::MAX;
 const INF: f64 = f64::INFINITY;
-const ANY: Kind = Num(-INF, INF);
-const UNIT: Kind = Num(0.0, 1.0);
-const COUNT: Kind = Int(0, i64::MAX);
-const SOME: Kind = Int(1, i64::MAX);
+const ANY: ValueKind = Num(-INF, INF);
+const UNIT: ValueKind = Num(0.0, 1.0);
+const COUNT: ValueKind = Int(0, i64::MAX);
+const SOME: ValueKind = Int(1, i64::MAX);
 const COMPONENTS: &[i64] = &[5120, 5121, 5122, 5123, 5125, 5126];
 
 pub(super) const ROOT: &Table = &[

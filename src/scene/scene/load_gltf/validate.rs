@@ -6,7 +6,7 @@ use std::path::Path;
 
 use serde_json::{Map, Value};
 
-use super::schema::{Kind, ROOT, Table};
+use super::schema::{ROOT, Table, ValueKind};
 use crate::issue::{Issue, Severity};
 use crate::settings::suggest;
 
@@ -159,33 +159,33 @@ impl<'a> Findings<'a> {
         }
     }
 
-    fn value(&mut self, value: &'a Value, kind: &Kind, at: &str) {
+    fn value(&mut self, value: &'a Value, kind: &ValueKind, at: &str) {
         match kind {
-            Kind::Bool => self.require(value.is_boolean(), at, "is not true or false"),
-            Kind::Text => self.require(value.is_string(), at, "is not a string"),
-            Kind::Uri => match value.as_str() {
+            ValueKind::Bool => self.require(value.is_boolean(), at, "is not true or false"),
+            ValueKind::Text => self.require(value.is_string(), at, "is not a string"),
+            ValueKind::Uri => match value.as_str() {
                 Some(uri) => self.require(is_uri(uri), at, "is not a valid URI"),
                 None => self.fault(at, "is not a string"),
             },
-            Kind::Int(least, most) => match integer(value) {
+            ValueKind::Int(least, most) => match integer(value) {
                 Some(i) if (*least..=*most).contains(&i) => {}
                 Some(i) => self.fault(at, format!("is {i}, out of range")),
                 None => self.fault(at, "is not an integer"),
             },
-            Kind::Num(least, most) => match value.as_f64() {
+            ValueKind::Num(least, most) => match value.as_f64() {
                 Some(v) if (*least..=*most).contains(&v) => {}
                 Some(v) => self.fault(at, format!("is {v}, out of range")),
                 None => self.fault(at, "is not a number"),
             },
-            Kind::IntIn(allowed) => match integer(value) {
+            ValueKind::IntIn(allowed) => match integer(value) {
                 Some(i) if allowed.contains(&i) => {}
                 _ => self.fault(at, format!("is {value}, not one of {allowed:?}")),
             },
-            Kind::TextIn(allowed) => match value.as_str() {
+            ValueKind::TextIn(allowed) => match value.as_str() {
                 Some(text) if allowed.contains(&text) => {}
                 _ => self.fault(at, format!("is {value}, not one of {allowed:?}")),
             },
-            Kind::Id(list) => {
+            ValueKind::Id(list) => {
                 let held = self.root.get(*list).and_then(Value::as_array).map_or(0, Vec::len);
                 match integer(value) {
                     Some(i) if (0..held as i64).contains(&i) => {}
@@ -194,14 +194,14 @@ impl<'a> Findings<'a> {
                     None => self.fault(at, "is not an index"),
                 }
             }
-            Kind::Object(table) => match value.as_object() {
+            ValueKind::Object(table) => match value.as_object() {
                 Some(object) => self.object(object, table, at),
                 None => self.fault(at, "is not an object"),
             },
-            Kind::List(of, least, most, distinct) => {
+            ValueKind::List(of, least, most, distinct) => {
                 self.list(value, of, *least, *most, *distinct, at)
             }
-            Kind::Map(of) => match value.as_object() {
+            ValueKind::Map(of) => match value.as_object() {
                 Some(map) => {
                     if map.is_empty() {
                         self.remark(at, "is empty");
@@ -218,7 +218,7 @@ impl<'a> Findings<'a> {
     fn list(
         &mut self,
         value: &'a Value,
-        of: &Kind,
+        of: &ValueKind,
         least: usize,
         most: usize,
         distinct: bool,

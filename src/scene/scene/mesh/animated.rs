@@ -5,7 +5,7 @@ use std::path::Path;
 use glam::DAffine3;
 
 use super::keyframes::shapes;
-use super::{Kind, Options, read_bounded};
+use super::{MeshFormat, Options, read_bounded};
 use crate::issue::Issue;
 use crate::scene::Mesh;
 use crate::scene::animation::{Track, Trs};
@@ -107,8 +107,8 @@ pub struct AnimatedMesh {
 /// Names of the animations of a file, as [`Choice::Named`] takes them; none where it is no glTF file, or
 /// cannot be read.
 pub fn animations(path: &Path) -> Vec<String> {
-    let bytes = match Kind::of(path) {
-        Some(Kind::Gltf) => read_bounded(path).unwrap_or_default(),
+    let bytes = match MeshFormat::of(path) {
+        Some(MeshFormat::Gltf) => read_bounded(path).unwrap_or_default(),
         _ => Vec::new(),
     };
     load_gltf::animations(path, &bytes)
@@ -132,7 +132,7 @@ pub fn load_animated(
     options: &Options,
     animation: Choice<'_>,
 ) -> Result<(Animated, Vec<Issue>), Vec<Issue>> {
-    if Kind::of(path) != Some(Kind::Gltf) {
+    if MeshFormat::of(path) != Some(MeshFormat::Gltf) {
         let cause = "only .gltf and .glb files have animations";
         let remedy = "list the shapes as keyframes, or convert them to .glb";
         return Err(vec![Issue::error(path, 1, cause, remedy)]);

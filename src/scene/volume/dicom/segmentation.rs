@@ -54,8 +54,8 @@ impl Segmentation {
         let elements = dicom.elements();
         let class = elements.text(&dicom.root, (0x0008, 0x0016));
         let kind = match class.as_deref() {
-            Some(SEGMENTS) => Kind::of(&dicom)?,
-            Some(LABEL_MAP) => Kind::LabelMap,
+            Some(SEGMENTS) => SegmentationType::of(&dicom)?,
+            Some(LABEL_MAP) => SegmentationType::LabelMap,
             _ => return Ok(None),
         };
         let segments = segments(&dicom)?;
@@ -116,8 +116,8 @@ impl Segmentation {
         };
         let voxels = size.iter().product();
         let layers = match kind {
-            Kind::LabelMap => vec![at.labels(&dicom, voxels, &segments)?],
-            Kind::Binary | Kind::Shares { .. } => {
+            SegmentationType::LabelMap => vec![at.labels(&dicom, voxels, &segments)?],
+            SegmentationType::Binary | SegmentationType::Shares { .. } => {
                 let mut order = Vec::new();
                 for (n, frame) in frames.iter().enumerate() {
                     order.push((segment_of(&dicom, frame, &segments)?, n));
@@ -132,7 +132,7 @@ impl Segmentation {
 
 /// The kind of a segmentation.
 #[derive(Clone, Copy)]
-enum Kind {
+enum SegmentationType {
     /// A bit for each pixel; some writers take a byte.
     Binary,
     /// Shares of what `most` says is a whole pixel, where the file says it.
@@ -141,7 +141,7 @@ enum Kind {
     LabelMap,
 }
 
-impl Kind {
+impl SegmentationType {
     fn of(dicom: &Dicom) -> Result<Self, FileError> {
         let elements = dicom.elements();
         let stated = elements.text(&dicom.root, (0x0062, 0x0001));

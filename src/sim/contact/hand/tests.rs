@@ -5,7 +5,7 @@ use glam::{DAffine3, DMat3, DQuat, DVec3};
 
 use super::{Body, Hand, PRESS, Spot};
 use crate::contact::Skin;
-use crate::probe::{Kind, Probe};
+use crate::probe::{Probe, ProbeKind};
 use crate::scene::Scene;
 
 fn skin(shape: &str) -> Skin {
@@ -175,7 +175,7 @@ fn on_the_abdomen_the_probe_slides_without_a_jump() {
 #[test]
 fn rays_beside_the_body_pick_nothing_and_the_far_side_is_reached_without_a_spin() {
     let skin = skin("sphere = { radius = 30, subdivisions = 5 }");
-    let probe = Probe { kind: Kind::Linear { width: 20.0 }, ..Probe::linear() };
+    let probe = Probe { kind: ProbeKind::Linear { width: 20.0 }, ..Probe::linear() };
     let hand = Hand::new(&skin, &probe);
     assert_eq!(hand.pick(DVec3::new(40.0, 0.0, 100.0), -DVec3::Z), None);
     let pose = above(30.0);

@@ -1,6 +1,6 @@
 use glam::{DAffine3, DVec2, dvec2};
 
-use super::super::calipers::{Kind, Reading};
+use super::super::calipers::{CaliperKind, Reading};
 use super::{Moment, Sheet, Tool, What};
 
 const REACH: f64 = 1.0;
@@ -32,7 +32,7 @@ fn two_clicks_or_a_drag_are_a_distance() {
     let mut sheet = Sheet::default();
     click(&mut sheet, 0.0, 0.0);
     assert!(sheet.marks().is_empty(), "no tool");
-    sheet.take(Some(Tool::Measure(Kind::Distance)));
+    sheet.take(Some(Tool::Measure(CaliperKind::Distance)));
     click(&mut sheet, 0.0, 10.0);
     sheet.motion(dvec2(0.0, 33.0));
     assert_eq!(sheet.draft().unwrap().points, [dvec2(0.0, 10.0), dvec2(0.0, 33.0)]);
@@ -47,11 +47,11 @@ fn two_clicks_or_a_drag_are_a_distance() {
 #[test]
 fn an_ellipse_takes_a_drag_and_a_click_and_an_angle_three_clicks() {
     let mut sheet = Sheet::default();
-    sheet.take(Some(Tool::Measure(Kind::Ellipse)));
+    sheet.take(Some(Tool::Measure(CaliperKind::Ellipse)));
     drag(&mut sheet, [0.0, 20.0], [10.0, 20.0]);
     assert!(sheet.marks().is_empty());
     click(&mut sheet, 5.0, 23.0);
-    sheet.take(Some(Tool::Measure(Kind::Angle)));
+    sheet.take(Some(Tool::Measure(CaliperKind::Angle)));
     for (x, z) in [(30.0, 10.0), (20.0, 10.0), (20.0, 50.0)] {
         click(&mut sheet, x, z);
     }
@@ -68,7 +68,7 @@ fn an_ellipse_takes_a_drag_and_a_click_and_an_angle_three_clicks() {
 #[test]
 fn ends_are_taken_moved_and_deleted() {
     let mut sheet = Sheet::default();
-    sheet.take(Some(Tool::Measure(Kind::Distance)));
+    sheet.take(Some(Tool::Measure(CaliperKind::Distance)));
     drag(&mut sheet, [0.0, 10.0], [20.0, 10.0]);
     drag(&mut sheet, [0.0, 30.0], [20.0, 30.0]);
     // Near an end, the end is taken, although a tool is active.
@@ -92,7 +92,7 @@ fn ends_are_taken_moved_and_deleted() {
 #[test]
 fn escape_takes_back_one_thing_after_the_other() {
     let mut sheet = Sheet::default();
-    sheet.take(Some(Tool::Measure(Kind::Distance)));
+    sheet.take(Some(Tool::Measure(CaliperKind::Distance)));
     drag(&mut sheet, [0.0, 10.0], [20.0, 10.0]);
     click(&mut sheet, 40.0, 40.0);
     assert!(sheet.draft().is_some() && sheet.cancel() && sheet.draft().is_none());
@@ -132,7 +132,7 @@ fn a_text_is_placed_by_a_click_and_points_after_a_drag() {
 #[test]
 fn an_outline_is_drawn_in_one_stroke_or_clicked_and_closed_at_its_beginning() {
     let mut sheet = Sheet::default();
-    sheet.take(Some(Tool::Measure(Kind::Trace)));
+    sheet.take(Some(Tool::Measure(CaliperKind::Trace)));
     sheet.press(dvec2(0.0, 10.0), REACH, NOW);
     for (x, z) in [(10.0, 10.0), (10.1, 10.0), (10.0, 20.0), (0.0, 20.0)] {
         sheet.motion(dvec2(x, z));
@@ -163,7 +163,7 @@ fn an_outline_is_drawn_in_one_stroke_or_clicked_and_closed_at_its_beginning() {
     // The tool put away in the middle leaves nothing behind.
     sheet.press(dvec2(0.0, 70.0), REACH, NOW);
     sheet.motion(dvec2(9.0, 70.0));
-    sheet.take(Some(Tool::Measure(Kind::Distance)));
+    sheet.take(Some(Tool::Measure(CaliperKind::Distance)));
     sheet.motion(dvec2(9.0, 79.0));
     drag(&mut sheet, [0.0, 80.0], [3.0, 84.0]);
     assert_eq!(distance(&sheet, 3), 5.0);
