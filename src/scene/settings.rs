@@ -114,6 +114,11 @@ impl Settings {
         find.found
     }
 
+    /// The tables as scene files write them: `[probe]`.
+    pub fn tables() -> Vec<String> {
+        Self::TABLES.iter().map(|table| format!("[{table}]")).collect()
+    }
+
     /// Scales the lattice with the wavelength, as in scene files: else speckle would lose its scatterers.
     /// `before` is the frequency that the cell suited, MHz.
     pub fn follow_frequency(&mut self, before: f64) {

@@ -299,7 +299,7 @@ fn load(
         *exit = Some(Exit::Open(path.clone()));
     }
     ui.separator();
-    let tables: Vec<String> = Settings::TABLES.iter().map(|table| format!("[{table}]")).collect();
+    let tables = Settings::tables();
     let tables = tables.join(", ");
     let text = format!(
         "{tables}, as far as the file has them. Anatomy and pose stay; Undo takes it back."

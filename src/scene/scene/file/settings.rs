@@ -61,7 +61,7 @@ impl Visitor for Taking<'_> {
 
 /// The tables of [`Settings`] as a sentence has them.
 fn tables(last: &str) -> String {
-    let names: Vec<String> = Settings::TABLES.iter().map(|table| format!("[{table}]")).collect();
+    let names = Settings::tables();
     let (end, before) = names.split_last().expect("there are some");
     format!("{} {last} {end}", before.join(", "))
 }
