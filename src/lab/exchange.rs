@@ -5,6 +5,7 @@ use std::path::Path;
 use glam::{DAffine3, DQuat};
 
 use crate::output::dicom::Transducer;
+use crate::output::picture::grey;
 use crate::output::{uff, zea};
 use crate::probe::{Probe, ProbeKind};
 use crate::scene::Scene;
@@ -117,7 +118,7 @@ impl Frames {
         }
         let (width, height, rgba) = simulator.pixels()?;
         assert_eq!([width, height], self.size, "frames of one size");
-        self.images.extend(rgba.chunks_exact(4).map(|p| p[0]));
+        self.images.extend(grey(&rgba));
         self.envelope.extend(simulator.envelope()?);
         let Some(labels) = simulator.labels()? else { return Ok(()) };
         self.classes = scene.tissues.iter().map(|tissue| tissue.name.clone()).collect();

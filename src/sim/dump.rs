@@ -6,6 +6,7 @@ mod stages;
 use std::path::{Path, PathBuf};
 
 use super::{SimError, Simulator};
+use crate::output::picture;
 use crate::scene::Scene;
 
 /// The folder in a dump that holds the bindings of the kernels.
@@ -56,7 +57,7 @@ pub fn frame(simulator: &mut Simulator, scene: &Scene, dir: &Path) -> Result<(),
 /// # Panics
 /// When `rgba` has not `4 * width * height` bytes.
 pub fn png(path: &Path, width: u32, height: u32, rgba: &[u8]) -> Result<(), DumpError> {
-    let grey: Vec<u8> = rgba.chunks_exact(4).map(|p| p[0]).collect();
+    let grey: Vec<u8> = picture::grey(rgba).collect();
     let image = image::GrayImage::from_raw(width, height, grey).expect("one byte per pixel");
     image.save(path).map_err(|e| DumpError::file(path, e))
 }

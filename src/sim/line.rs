@@ -7,6 +7,7 @@ use super::lane::{Shot, pixels};
 use super::layout::{self, LATERAL_REACH};
 use super::tables::Tables;
 use super::{Outputs, SimError, Simulator};
+use crate::output::picture::grey;
 use crate::scene::Scene;
 
 /// A scanline that is made alone.
@@ -99,6 +100,6 @@ impl Simulator {
         let line = OneLine { number, rows, reach, smoothed };
         self.make(scene, &[Shot::of(scene, index)], Some(line), &Outputs::default())?;
         let rgba = self.read_again(pixels(false))?;
-        Ok(rgba.chunks_exact(4).map(|pixel| pixel[0]).collect())
+        Ok(grey(&rgba).collect())
     }
 }

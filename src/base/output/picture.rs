@@ -1,12 +1,17 @@
 //! Pictures that say how large they are and what they show.
 
+/// The grey levels of RGBA pixels that are grey: their red.
+pub fn grey(rgba: &[u8]) -> impl Iterator<Item = u8> {
+    rgba.chunks_exact(4).map(|pixel| pixel[0])
+}
+
 /// A PNG file in 8-bit grey, the red channel of `rgba`: pixels of `pitch` mm (`pHYs`), and a text under the
 /// keyword `insonify` (`iTXt`).
 ///
 /// # Panics
 /// When `rgba` has not `4 * width * height` bytes.
 pub fn grey_png([width, height]: [u32; 2], rgba: &[u8], pitch: f64, text: Option<&str>) -> Vec<u8> {
-    let grey: Vec<u8> = rgba.chunks_exact(4).map(|p| p[0]).collect();
+    let grey: Vec<u8> = grey(rgba).collect();
     let per_metre = (1000.0 / pitch).round() as u32;
     let mut out = Vec::new();
     let mut encoder = png::Encoder::new(&mut out, width, height);

@@ -3,6 +3,7 @@
 use glam::{DAffine3, DMat3, DVec3};
 
 use super::AcquireError;
+use crate::output::picture::grey;
 use crate::probe::ProbeKind;
 use crate::scene::Scene;
 use crate::sim::Simulator;
@@ -90,7 +91,7 @@ impl Recording {
     ) {
         let [width, height] = self.size.map(|n| n as usize);
         assert_eq!(rgba.len(), 4 * width * height, "a frame of {width} x {height} pixels");
-        self.pixels.extend(rgba.chunks_exact(4).map(|p| p[0]));
+        self.pixels.extend(grey(rgba));
         let poses = [(CALIBRATION, self.probe_from_image)].into_iter().chain(poses);
         self.frames.push(TrackedFrame {
             timestamp: Some(time),

@@ -10,6 +10,7 @@ use super::draws::Count;
 use super::plan::{Array, Format, Plan, Sample, Segmented};
 use crate::gpu::Device;
 use crate::output::indexed::NOTHING;
+use crate::output::picture;
 use crate::scene::Scene;
 use crate::scene::file::{SceneError, stated_pose};
 use crate::sim::contact::{SkinContact, Skins};
@@ -156,7 +157,7 @@ fn made(
     simulator: &mut Simulator,
 ) -> Result<Made, DatasetError> {
     let (width, height, rgba) = simulator.pixels()?;
-    let grey: Vec<u8> = rgba.chunks_exact(4).map(|p| p[0]).collect();
+    let grey: Vec<u8> = picture::grey(&rgba).collect();
     let frame: Frame = *simulator.constants();
     let labels = simulator.labels()?.expect("the scene asks for them").pixels;
     let samples = frame.samples as usize;

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use gif::{Encoder, Frame, Repeat};
 
 use crate::output::files::Draft;
+use crate::output::picture::grey;
 
 /// Reason for which an animation was not written.
 #[derive(Debug, thiserror::Error)]
@@ -106,7 +107,7 @@ impl Movie {
             width,
             height,
             delay,
-            buffer: rgba.chunks_exact(4).map(|p| p[0]).collect::<Vec<_>>().into(),
+            buffer: grey(rgba).collect::<Vec<_>>().into(),
             ..Frame::default()
         })?;
         self.state = State::Begun(encoder);
