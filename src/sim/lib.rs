@@ -234,7 +234,7 @@ impl Simulator {
         self.make(scene, shots, None, outputs)
     }
 
-    /// Makes images, or one line of them each.
+    /// Makes images, or one line of them each. Levels are relative to the echo of a perfect mirror.
     fn make(
         &mut self,
         scene: &Scene,
@@ -247,27 +247,34 @@ impl Simulator {
         let labelled = scene.simulation.labels && line.is_none();
         let levelled = labelled && scene.simulation.levelled();
         let passes = &mut self.passes;
+        // 1. Shapes, instance rows and the top level (mm, world), where something has moved.
         let mut cmd = self.submissions.begin()?;
         let updated = passes.update(&mut cmd, scene, &self.tables, self.coincident, shots, line)?;
         self.update_time = exchanged + updated;
+        // 2. Coupled share of each element, 0..1.
         passes.touch(&mut cmd, scene, shots)?;
         let sizes = passes.batches.sizes(passes.frame(), &self.tables);
         passes.clear(&mut cmd, &sizes);
+        // 3. Sums of echoes: complex, fixed point, what the way has weakened still to be taken off.
         passes.echoes(&mut cmd, levelled)?;
+        // 4. Lateral-smoothed complex baseband, with noise: level.
         passes.run(&mut cmd, &BEAM)?;
+        // 5. IQ: level; log image: 0 black to 1 white.
         passes.run(&mut cmd, &AXIAL)?;
-        // A line alone has too few beside it.
+        // 6. The log image filtered. A line alone has too few beside it.
         if line.is_none() && scene.processing.is_on() {
             passes.enhance(&mut cmd, &scene.processing)?;
         }
         // From here on the frame is not abandoned, so that the picture is replaced as a whole.
         cmd.keep_on();
+        // 7. RGBA, pixels of the picture's pitch (mm); of a frame that shows a volume at 9.
         let fusion = scene.fusion.as_ref().filter(|_| line.is_none() && scene.shows_volume());
         if fusion.is_none() {
             passes.run(&mut cmd, &DISPLAY)?;
         }
         let fused = fusion.is_some();
         self.last = Last { labelled, levelled, ..Last::default() };
+        // 8. Labels of samples and pixels: indices, mm, dB (docs/labels.md).
         if labelled {
             passes.run(&mut cmd, &LABEL)?;
             if levelled {
@@ -276,10 +283,12 @@ impl Simulator {
             }
             passes.run(&mut cmd, &CHART)?;
         }
+        // 9. RGBA, mixed with the volume.
         if let Some(fusion) = fusion {
             passes.fuse(&mut cmd, fusion)?;
         }
         self.last.fused = fused;
+        // 10. Copies for whoever shows them, and of what was read before.
         if let Some(image) = outputs.shown {
             cmd.copy_to_image(passes.lanes[0].pixels(fused), image)?;
         }
