@@ -57,7 +57,7 @@ def import_labels(
     whole = given.dtype.kind in "bui"
     dtype = np.uint8 if whole and most < 256 else np.uint16 if whole and most < 65536 else np.float32
     of_numbers = dict(enumerate(names)) if isinstance(names, Sequence) else dict(names or {})
-    path, told = _insonify.import_labels(
+    path, messages = _insonify.import_labels(
         given.astype(dtype).ravel(order="F"),
         list(given.shape),
         affine,
@@ -70,6 +70,6 @@ def import_labels(
         None if spacing is None else [float(mm) for mm in np.broadcast_to(spacing, 3)],
         force,
     )
-    for text in told:
+    for text in messages:
         warnings.warn(text, stacklevel=2)
     return Scene.load(path)

@@ -182,11 +182,11 @@ def _counted(count: int, progress: bool) -> Iterator[int]:
     try:
         from tqdm.auto import tqdm  # type: ignore[import-untyped]
     except ImportError:
-        return _told(count)
+        return _lines(count)
     return iter(tqdm(range(count), unit="frame"))
 
 
-def _told(count: int) -> Iterator[int]:
+def _lines(count: int) -> Iterator[int]:
     import sys
 
     began = said = time.monotonic()

@@ -69,7 +69,7 @@ pub fn import_labels(
         let map = LabelMap::of_voxels(name, size, placed, voxels, &names)?;
         let draft = import::map::import(name, map, &folder, &options, &mut |_, _, _| {})?;
         let path = draft.finish()?;
-        Ok((path, draft.told()))
+        Ok((path, draft.messages()))
     };
     py.detach(made).map_err(|error| SceneError::new_err(explanation(&error)))
 }

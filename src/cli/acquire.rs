@@ -266,8 +266,8 @@ mod tests {
             ("lineal:3", "no sweep"),
             ("way.txt", ".csv or .toml"),
         ] {
-            let told = way(text).expect_err(text);
-            assert!(told.contains(cause), "{text}: {told}");
+            let message = way(text).expect_err(text);
+            assert!(message.contains(cause), "{text}: {message}");
         }
     }
 }

@@ -181,7 +181,7 @@ fn device_set(source: &Path, folder: &Path, args: &Import) -> Result<()> {
     let path = scene.finish()?;
     // What of it can be seen is known with the probe's pose and all meshes.
     notes(Scene::load(&path, &[])?.1);
-    scene.draft.told().iter().for_each(output::line);
+    scene.draft.messages().iter().for_each(output::line);
     for part in &scene.draft.parts {
         output::line(format!("{}: {} triangles, {:.1} ml", part.name, part.triangles, part.volume));
     }
@@ -228,7 +228,7 @@ fn report(draft: &Draft) {
             part.name, part.tissue, part.triangles, part.volume
         ));
     }
-    draft.told().iter().for_each(output::line);
+    draft.messages().iter().for_each(output::line);
     let all: usize = draft.parts.iter().map(|p| p.triangles).sum();
     output::line(format!("{} meshes, {all} triangles", draft.parts.len()));
     match &draft.view {

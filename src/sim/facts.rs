@@ -101,12 +101,12 @@ mod tests {
 
     #[test]
     fn a_scene_file_takes_the_settings_that_are_said() {
-        let mut said = Settings::of(Probe::abdominal());
-        said.probe.depth = 123.25;
-        said.imaging = Imaging { gain: 7.5, psf_scale: [1.5, 0.75, 1.0], ..Imaging::default() };
-        said.simulation =
-            Simulation { paths: 3, volume_floor: f64::NEG_INFINITY, ..said.simulation };
-        let json = settings(&said);
+        let mut stated = Settings::of(Probe::abdominal());
+        stated.probe.depth = 123.25;
+        stated.imaging = Imaging { gain: 7.5, psf_scale: [1.5, 0.75, 1.0], ..Imaging::default() };
+        stated.simulation =
+            Simulation { paths: 3, volume_floor: f64::NEG_INFINITY, ..stated.simulation };
+        let json = settings(&stated);
         assert_eq!(json["probe"]["depth"], 123.25);
         assert_eq!(json["units"]["probe.depth"], "mm");
         let mut entries = Vec::new();
@@ -124,6 +124,6 @@ mod tests {
         }
         let (scene, _) =
             SceneFile::of("a.toml".as_ref(), String::new()).load(&entries).expect("sound");
-        assert_eq!(scene.settings, said);
+        assert_eq!(scene.settings, stated);
     }
 }

@@ -85,11 +85,11 @@ mod tests {
         let mut scene = Scene::homogeneous(liver, Probe::paper_table1());
         assert_eq!(beyond_some_devices(&scene), None);
         scene.imaging.image_height = 8192;
-        let told = beyond_some_devices(&scene).expect("too high");
-        assert!(told.0.contains("x 8192 pixels") && told.1.contains("image_height"), "{told:?}");
+        let fault = beyond_some_devices(&scene).expect("too high");
+        assert!(fault.0.contains("x 8192 pixels") && fault.1.contains("image_height"), "{fault:?}");
         scene.imaging.image_height = 400;
         (scene.probe.scanlines, scene.probe.samples) = (4096, 65_536);
-        let told = beyond_some_devices(&scene).expect("too many");
-        assert!(told.0.contains("2048 MiB") && told.1.contains("probe.samples"), "{told:?}");
+        let fault = beyond_some_devices(&scene).expect("too many");
+        assert!(fault.0.contains("2048 MiB") && fault.1.contains("probe.samples"), "{fault:?}");
     }
 }

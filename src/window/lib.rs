@@ -98,9 +98,9 @@ pub fn run(scene: Scene, options: Options) -> Result<(), ViewError> {
 
 /// An error of the window system without the place in its library's sources that it begins with, and without its full
 /// stop.
-fn without_place(said: &str) -> &str {
-    let cause = said.split_once(".rs:").and_then(|(_, rest)| rest.split_once(": "));
-    cause.map_or(said, |(_, cause)| cause).trim_end_matches('.')
+fn without_place(message: &str) -> &str {
+    let cause = message.split_once(".rs:").and_then(|(_, rest)| rest.split_once(": "));
+    cause.map_or(message, |(_, cause)| cause).trim_end_matches('.')
 }
 
 #[cfg(test)]
@@ -109,9 +109,9 @@ mod tests {
 
     #[test]
     fn errors_of_the_window_system_name_no_source_file() {
-        let said = "os error at /home/a/winit-0.30.12/src/platform_impl/linux/mod.rs:768: neither \
+        let message = "os error at /home/a/winit-0.30.12/src/platform_impl/linux/mod.rs:768: neither \
                     WAYLAND_DISPLAY nor WAYLAND_SOCKET nor DISPLAY is set.";
         let cause = "neither WAYLAND_DISPLAY nor WAYLAND_SOCKET nor DISPLAY is set";
-        assert_eq!([said, cause, ""].map(without_place), [cause, cause, ""]);
+        assert_eq!([message, cause, ""].map(without_place), [cause, cause, ""]);
     }
 }

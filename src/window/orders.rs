@@ -50,9 +50,9 @@ impl Commanded for Commands<'_> {
 
     fn open(&mut self, name: &str) -> Result<String, String> {
         let path = Reach::of(&self.model.file.path).scene(name)?;
-        let told = format!("opening {}", path.display());
+        let answer = format!("opening {}", path.display());
         *self.wanted = Some(path);
-        Ok(told)
+        Ok(answer)
     }
 }
 
@@ -75,35 +75,35 @@ mod tests {
         let mut model = Model::new(&scene, file, Tracer::Bvh, 0.0, now);
         let mut wanted = None;
         let before = model.settings.clone();
-        let mut told = |text: &str| {
+        let mut answer = |text: &str| {
             let order = Order::of(text).expect(text);
             let mut commands = Commands { model: &mut model, wanted: &mut wanted, now };
             let outcome = order.carry_out(&mut commands);
             (outcome, model.settings.clone(), model.frozen, wanted.clone())
         };
-        let (outcome, after, ..) = told("probe.depth = 77 mm\nimaging.gain = 3");
+        let (outcome, after, ..) = answer("probe.depth = 77 mm\nimaging.gain = 3");
         assert_eq!(outcome, Ok("probe.depth = 77 mm\nimaging.gain = 3".to_owned()));
         assert_eq!((after.probe.depth, after.imaging.gain), (77.0, 3.0));
         // All else stays, to the bit.
         let mut expected = before;
         (expected.probe.depth, expected.imaging.gain) = (77.0, 3.0);
         assert!(after == expected);
-        assert_eq!(told("get probe.depth").0, Ok("probe.depth = \"77 mm\"".to_owned()));
-        let table = told("get imaging").0.expect("a table");
+        assert_eq!(answer("get probe.depth").0, Ok("probe.depth = \"77 mm\"".to_owned()));
+        let table = answer("get imaging").0.expect("a table");
         assert!(table.contains("imaging.gain = \"3 dB\"\n"), "{table}");
         assert!(table.contains("imaging.dynamic_range = "), "{table}");
-        assert!(told("get tissues.liver").0.is_err_and(|e| e.contains("serve")));
+        assert!(answer("get tissues.liver").0.is_err_and(|e| e.contains("serve")));
         for (wrong, cause) in [
             ("probe.dept = 3", "depth"),
             ("imaging.gain = 900", "between"),
             ("mesh.a.tissue = liver", "[imaging]"),
             ("scene = nowhere", "abdomen"),
         ] {
-            let (outcome, settings, ..) = told(wrong);
+            let (outcome, settings, ..) = answer(wrong);
             assert!(outcome.as_ref().is_err_and(|e| e.contains(cause)), "{wrong}: {outcome:?}");
             assert!(settings == expected, "{wrong}");
         }
-        assert!(told("freeze").2 && !told("unfreeze").2);
-        assert!(told("scene = heart").3.is_some_and(|path| path.ends_with("heart.toml")));
+        assert!(answer("freeze").2 && !answer("unfreeze").2);
+        assert!(answer("scene = heart").3.is_some_and(|path| path.ends_with("heart.toml")));
     }
 }

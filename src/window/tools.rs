@@ -267,7 +267,7 @@ impl Tools {
             pitch: frame.sector.pitch,
             corner: [frame.sector.left, frame.sector.top],
         };
-        let said = json!({
+        let facts = json!({
             "program": concat!("insonify ", env!("CARGO_PKG_VERSION")),
             "saved": Local::now().to_rfc3339_opts(SecondsFormat::Secs, false),
             "scene": model.title,
@@ -278,7 +278,7 @@ impl Tools {
             "pose": facts::pose(&frame.pose),
             "quality": frame.grade.json(),
         });
-        match said {
+        match facts {
             Value::Object(map) => map,
             _ => unreachable!("made as one"),
         }
@@ -343,7 +343,7 @@ fn settings(model: &Model, frame: &Frame, pose: Option<&DAffine3>) -> Sidecar {
     let set = model.entries(&settings, pose).into_iter();
     let set: Sidecar = set.map(|(path, value)| (path, value.into())).collect();
     let all = facts::settings(&settings);
-    let said =
+    let facts =
         [("set", set.into()), ("settings", all), ("tracer", settings.tracer.to_string().into())];
-    said.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()
+    facts.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()
 }

@@ -139,12 +139,12 @@ mod tests {
             (at(3), None, true),
             (at(3), None, false),
         ];
-        for (i, (scene, mesh, told)) in looks.into_iter().enumerate() {
-            assert_eq!(watched.look(vec![scene, mesh]), told, "{i}");
-            assert_eq!(std::mem::take(&mut watched.changed), told, "{i}");
+        for (i, (scene, mesh, expected)) in looks.into_iter().enumerate() {
+            assert_eq!(watched.look(vec![scene, mesh]), expected, "{i}");
+            assert_eq!(std::mem::take(&mut watched.changed), expected, "{i}");
         }
         // The scene file itself stays away: told once, and again when it has been back.
-        for (i, (scene, told)) in [
+        for (i, (scene, expected)) in [
             (None, false),
             (None, true),
             (None, false),
@@ -155,8 +155,8 @@ mod tests {
         .into_iter()
         .enumerate()
         {
-            assert_eq!(watched.look(vec![scene, None]), told, "{i}");
-            assert_eq!(std::mem::take(&mut watched.untold), told, "{i}");
+            assert_eq!(watched.look(vec![scene, None]), expected, "{i}");
+            assert_eq!(std::mem::take(&mut watched.untold), expected, "{i}");
             assert!(!watched.changed, "{i}");
         }
     }

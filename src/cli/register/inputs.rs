@@ -26,10 +26,10 @@ pub fn points(args: &Register) -> Result<Option<Vec<DVec3>>> {
         return Ok(None);
     };
     let (mesh, ras) = mesh_file(file)?;
-    let said = if ras { Frame::Ras } else { points::frame_of_mesh(file)? };
-    let frame = points::agreed(file, said, args.frame)?;
+    let own = if ras { Frame::Ras } else { points::frame_of_mesh(file)? };
+    let frame = points::agreed(file, own, args.frame)?;
     // A file that states its frame was read into LPS.
-    let read = if said == Frame::Unstated { frame } else { Frame::Lps };
+    let read = if own == Frame::Unstated { frame } else { Frame::Lps };
     let signs = read.lps_signs();
     let triangles = placed(&mesh, &DAffine3::from_scale(signs));
     Ok(Some(samples(&triangles, args.samples as usize)))

@@ -132,8 +132,8 @@ mod tests {
             ("transform.0.motion", "{ kind = \"trajectory\", file = \"a.csv\" }"),
             ("mesh", "[{ name = \"a\", file = \"a.obj\" }]"),
         ] {
-            let told = one(path, value).expect_err(path);
-            assert!(told.contains("names a file") && told.contains(path), "{told}");
+            let message = one(path, value).expect_err(path);
+            assert!(message.contains("names a file") && message.contains(path), "{message}");
         }
         for (path, value) in [
             ("imaging.gain", "3 dB"),

@@ -149,7 +149,7 @@ impl Draft {
     }
 
     /// Remarks for a person: structures that are no mesh, what is remarkable, and structures whose tissue is a guess.
-    pub fn told(&self) -> Vec<String> {
+    pub fn messages(&self) -> Vec<String> {
         let left_out = self.left_out.iter();
         let left_out = left_out.map(|part| format!("left out: {part}, which no scene takes"));
         let remarks = self.remarks.iter().map(|remark| format!("note: {remark}"));

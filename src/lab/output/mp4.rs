@@ -33,7 +33,7 @@ pub enum Mp4Error {
     Unstarted(std::io::Error),
     /// It has ended with an error.
     #[error(
-        "{} was not written: ffmpeg ended ({status}) and said: {said}. It needs the encoder libx264 and room on the disk; \
+        "{} was not written: ffmpeg ended ({status}) and said: {output}. It needs the encoder libx264 and room on the disk; \
          a GIF needs neither", path.display()
     )]
     Ended {
@@ -42,7 +42,7 @@ pub enum Mp4Error {
         /// How it ended, in the system's words.
         status: String,
         /// Its last messages.
-        said: String,
+        output: String,
     },
     /// The film cannot take its place.
     #[error("{} cannot be written: {cause}. Name a folder that can be written to", path.display())]
@@ -185,11 +185,11 @@ impl Encoder {
             .stderr(Stdio::piped())
             .spawn()
             .map_err(unstarted)?;
-        let mut said = child.stderr.take().expect("piped");
+        let mut output = child.stderr.take().expect("piped");
         let messages = std::thread::spawn(move || {
             let mut text = Vec::new();
             // What came until then is said.
-            let _ = said.read_to_end(&mut text);
+            let _ = output.read_to_end(&mut text);
             String::from_utf8_lossy(&text).into_owned()
         });
         Ok(Self { child, messages: Some(messages), beside })
@@ -212,11 +212,11 @@ impl Encoder {
         let status = self.child.wait().map_or_else(|e| e.to_string(), |status| status.to_string());
         let text = self.messages.take().and_then(|thread| thread.join().ok()).unwrap_or_default();
         let lines: Vec<&str> = text.lines().filter(|line| !line.trim().is_empty()).collect();
-        let said = match lines.is_empty() {
+        let output = match lines.is_empty() {
             true => "nothing".to_owned(),
             false => lines[lines.len().saturating_sub(LINES)..].join("; "),
         };
-        Mp4Error::Ended { path: path.to_owned(), status, said }
+        Mp4Error::Ended { path: path.to_owned(), status, output }
     }
 }
 

@@ -167,26 +167,26 @@ pub fn frame_of_mesh(path: &Path) -> Result<Frame, FileError> {
     let file = std::fs::File::open(path).map_err(fail)?;
     file.take(1024).read_to_end(&mut head).map_err(fail)?;
     let head = String::from_utf8_lossy(&head);
-    let Some((_, said)) = head.split_once("SPACE=") else {
+    let Some((_, own)) = head.split_once("SPACE=") else {
         return Ok(Frame::Unstated);
     };
-    let said = said.chars().take_while(char::is_ascii_alphanumeric);
-    frame_named(&said.collect::<String>()).map_err(|cause| unknown_frame(path, 0, &cause))
+    let own = own.chars().take_while(char::is_ascii_alphanumeric);
+    frame_named(&own.collect::<String>()).map_err(|cause| unknown_frame(path, 0, &cause))
 }
 
 /// The common frame of a file and of the user.
 ///
 /// # Errors
 /// The two differ.
-pub fn agreed(path: &Path, said: Frame, stated: Option<Frame>) -> Result<Frame, FileError> {
-    match (said, stated) {
+pub fn agreed(path: &Path, own: Frame, stated: Option<Frame>) -> Result<Frame, FileError> {
+    match (own, stated) {
         (Frame::Unstated, stated) => Ok(stated.unwrap_or(Frame::Lps)),
-        (said, Some(stated)) if said != stated => Err(FileError::file(
+        (own, Some(stated)) if own != stated => Err(FileError::file(
             path,
-            format!("says that it is in {}, and --frame {}", said.name(), stated.name()),
+            format!("says that it is in {}, and --frame {}", own.name(), stated.name()),
             "leave --frame out; or correct the file",
         )),
-        (said, _) => Ok(said),
+        (own, _) => Ok(own),
     }
 }
 

@@ -219,14 +219,14 @@ impl Key {
         let mut reader = csv::Reader::from_reader(text.as_bytes());
         let rows: Result<Vec<Row>, _> = reader.deserialize().collect();
         let rows = rows.map_err(|e| fail(format!("is not the key of a study: {e}")))?;
-        let said = rows.first().map(|row| row.study.clone());
+        let study = rows.first().map(|row| row.study.clone());
         let key = Self::new(rows.clone()).map_err(&fail)?;
         match rows.iter().position(|row| row.study != key.id()) {
             None => Ok(key),
             Some(_) => Err(fail(format!(
                 "was changed after it was written: its rows come to the study {}, they say {}",
                 key.id(),
-                said.unwrap_or_default()
+                study.unwrap_or_default()
             ))),
         }
     }

@@ -127,8 +127,8 @@ mod tests {
         for (path, change) in changes {
             let mut settings = settings(Probe::abdominal());
             change(&mut settings);
-            let told: Vec<_> = silent(&settings).into_iter().map(|s| s.path).collect();
-            assert_eq!(told, [path]);
+            let found: Vec<_> = silent(&settings).into_iter().map(|s| s.path).collect();
+            assert_eq!(found, [path]);
         }
     }
 
@@ -137,13 +137,13 @@ mod tests {
         let mut settings = settings(Probe::abdominal());
         settings.probe.samples = 64;
         settings.simulation.cell = 3.0;
-        let told = silent(&settings);
+        let found = silent(&settings);
         let number = |text: &str| -> f64 {
             let number = text.split_whitespace().find_map(|word| word.parse().ok());
             number.expect("a number")
         };
-        settings.simulation.cell = number(&told[0].remedy);
-        settings.probe.samples = number(&told[1].remedy) as u32;
+        settings.simulation.cell = number(&found[0].remedy);
+        settings.probe.samples = number(&found[1].remedy) as u32;
         assert_eq!(silent(&settings), []);
     }
 }

@@ -138,8 +138,8 @@ mod tests {
             (DAffine3::from_translation(DVec3::new(f64::NAN, 0.0, 0.0)), "finite"),
             (DAffine3::from_translation(DVec3::new(2e5, 0.0, 0.0)), "mm from"),
         ] {
-            let said = rigid(wrong).expect_err(why);
-            assert!(said.contains(why), "{said}");
+            let message = rigid(wrong).expect_err(why);
+            assert!(message.contains(why), "{message}");
         }
     }
 }

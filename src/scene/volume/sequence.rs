@@ -127,12 +127,12 @@ impl Sequence {
     /// There are several; `path` is the file.
     pub fn has_one_pixel_size(&self, path: &Path) -> Result<(), FileError> {
         let sizes = frames::pixels(self.frames.iter().enumerate());
-        match frames::pixels_told(&sizes).filter(|_| sizes.len() > 1) {
+        match frames::pixel_sizes(&sizes).filter(|_| sizes.len() > 1) {
             None => Ok(()),
-            Some(told) => Err(FileError::file(
+            Some(sizes) => Err(FileError::file(
                 path,
                 format!(
-                    "has {told}: the depth was changed, and one calibration is right for one of them"
+                    "has {sizes}: the depth was changed, and one calibration is right for one of them"
                 ),
                 "save the frames of each size as a sequence of their own, and reconstruct each with its calibration",
             )),

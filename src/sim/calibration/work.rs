@@ -95,7 +95,10 @@ mod tests {
         assert_eq!(Work::of(&scene(0.15, 8.0)), None);
         assert_eq!(Work::of(&scene(0.01, 8.0)), None, "thinned");
         let most = Calibration::new(&scene(1.0, 0.0)).lattice_cells();
-        let told = |cells: f64| Work::of(&scene((most / cells).cbrt(), 0.0)).map(|w| w.too_much);
-        assert_eq!([4e9, 6e9, 1e11, 3e11].map(told), [None, Some(false), Some(false), Some(true)]);
+        let judged = |cells: f64| Work::of(&scene((most / cells).cbrt(), 0.0)).map(|w| w.too_much);
+        assert_eq!(
+            [4e9, 6e9, 1e11, 3e11].map(judged),
+            [None, Some(false), Some(false), Some(true)]
+        );
     }
 }

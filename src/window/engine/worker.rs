@@ -136,7 +136,7 @@ impl Worker {
                 Job::Image(order) => self.taken(order, index),
                 Job::Columns(order) => {
                     let taken = self.taken(order, index);
-                    let told = match self.columns(&mut simulator, &taken) {
+                    let news = match self.columns(&mut simulator, &taken) {
                         Ok(Some(Film::Columns(aim, columns))) => {
                             let probe = taken.order.settings.probe.clone();
                             Ok(News::Columns(Box::new(probe), aim, columns))
@@ -148,7 +148,7 @@ impl Worker {
                         }
                         Err(error) => Err(error),
                     };
-                    if !self.report(told, false) {
+                    if !self.report(news, false) {
                         return;
                     }
                     continue;
@@ -207,11 +207,11 @@ impl Worker {
             if taken.level.is_none() {
                 self.last = Some(taken.order);
             }
-            let told = frame.map(|(frame, film)| match taken.past {
+            let news = frame.map(|(frame, film)| match taken.past {
                 true => News::Anew(Box::new(frame)),
                 false => News::Frame(Box::new(frame), film),
             });
-            if !self.report(told, simulator.is_none()) {
+            if !self.report(news, simulator.is_none()) {
                 return;
             }
         }
@@ -236,8 +236,8 @@ impl Worker {
                 true
             }
             Some(pictured) => {
-                let told = pictured.map(|pictured| News::View3d(Box::new(pictured)));
-                self.report(told, false)
+                let news = pictured.map(|pictured| News::View3d(Box::new(pictured)));
+                self.report(news, false)
             }
             None => true,
         }

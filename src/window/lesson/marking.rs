@@ -65,8 +65,8 @@ pub(super) fn marked(order: Order, wake: Wake) -> std::io::Result<Marking> {
 }
 
 fn mark(order: Order) -> Found {
-    let told = |e: crate::scene::SceneError| e.to_string();
-    let (mut scene, _) = Scene::load(&order.file, &order.overrides).map_err(told)?;
+    let text = |e: crate::scene::SceneError| e.to_string();
+    let (mut scene, _) = Scene::load(&order.file, &order.overrides).map_err(text)?;
     let found = scene.tasks.iter().find(|task| task.name == order.task);
     let task = found.cloned().ok_or("the scene file no longer has this task")?;
     let path = Path::of(&order.track, &scene.world_from_probe);

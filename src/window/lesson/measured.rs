@@ -106,11 +106,11 @@ pub(super) fn show(ui: &mut Ui, model: &Model, measured: &mut Measured, unit: Un
             measured.text = format!("{:.2}", offers[at].value);
         }
         let all: Vec<usize> = (0..offers.len()).collect();
-        let said = |at: usize| {
+        let shown = |at: usize| {
             let Offer { name, value } = &offers[at];
             format!("{name}: {value:.1} {}", unit.word())
         };
-        style::choice(ui, "measured", 200.0, &mut at, &all, said);
+        style::choice(ui, "measured", 200.0, &mut at, &all, shown);
     });
     if at != was {
         measured.chosen.clone_from(&offers[at].name);

@@ -34,8 +34,8 @@ mod tests {
             (7_199_999, "1 h"),
         ] {
             let now = Duration::from_millis(ms);
-            let (said, rest) = age(now);
-            assert_eq!(said, words);
+            let (text, rest) = age(now);
+            assert_eq!(text, words);
             assert_eq!(age(now + rest - Duration::from_nanos(1)).0, words);
             assert_ne!(age(now + rest).0, words, "{ms}");
         }

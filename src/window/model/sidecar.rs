@@ -129,22 +129,22 @@ mod tests {
             Mark { letter: 'B', what: What::Note(note), of: later },
         ];
         let all = Marks { kept: all[..1].to_vec(), shown: all.to_vec() };
-        let said = marks(&all, &[moment]);
+        let listed = marks(&all, &[moment]);
         let expected = json!([{
             "letter": "A", "kind": "distance", "label": "BPD",
             "points_mm": [[0.0, 0.0], [3.0, 4.0]],
             "of_this_image": true,
             "length_mm": 5.0,
         }]);
-        assert_eq!(said["measurements"], expected);
-        assert_eq!(said["texts"][0]["text"], "vessel");
-        assert_eq!(said["texts"][0]["of_this_image"], false);
-        let earlier = &said["worksheet"][0];
+        assert_eq!(listed["measurements"], expected);
+        assert_eq!(listed["texts"][0]["text"], "vessel");
+        assert_eq!(listed["texts"][0]["of_this_image"], false);
+        let earlier = &listed["worksheet"][0];
         assert_eq!((&earlier["label"], &earlier["length_mm"]), (&json!("BPD"), &json!(5.0)));
         assert_eq!(earlier["of_this_image"], json!(null));
-        let said = marks(&all, &[later, moment]);
-        assert_eq!(said["measurements"][0]["of_frame"], 1);
-        assert_eq!(said["texts"][0]["of_frame"], 0);
+        let listed = marks(&all, &[later, moment]);
+        assert_eq!(listed["measurements"][0]["of_frame"], 1);
+        assert_eq!(listed["texts"][0]["of_frame"], 0);
         assert_eq!(pose(&moment.pose)["position_mm"], json!([1.0, 2.0, 3.0]));
         assert_eq!(pose(&moment.pose)["depth"], json!([0.0, 0.0, 1.0]));
     }

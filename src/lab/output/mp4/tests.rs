@@ -43,11 +43,11 @@ fn the_encoder_gets_even_frames_at_the_loops_rate_and_no_shell() {
     film(&program, &path).expect("written");
     let count = std::fs::read_to_string(&path).expect("in its place");
     assert_eq!(count.trim(), (4 * 6 * 4 * 3).to_string(), "four frames of 6 by 4 pixels");
-    let said = std::fs::read_to_string(folder.path().join("said")).expect("there");
+    let log = std::fs::read_to_string(folder.path().join("said")).expect("there");
     for part in
         ["-video_size 6x4", "-framerate 10.0000", "-c:v libx264", "-pix_fmt yuv420p", "rgb24"]
     {
-        assert!(said.contains(part), "{part}: {said}");
+        assert!(log.contains(part), "{part}: {log}");
     }
     assert_eq!(names(folder.path()).len(), 3, "nothing else was made");
 }

@@ -47,9 +47,9 @@ pub(super) fn read(
     })?;
     let mut out = Vec::new();
     for markup in file.markups {
-        let said = markup.coordinate_system.as_deref().map_or(Ok(Frame::Lps), frame_named);
-        let said = said.map_err(|cause| unknown_frame(path, 0, &cause))?;
-        let signs = agreed(path, said, stated)?.lps_signs();
+        let own = markup.coordinate_system.as_deref().map_or(Ok(Frame::Lps), frame_named);
+        let own = own.map_err(|cause| unknown_frame(path, 0, &cause))?;
+        let signs = agreed(path, own, stated)?.lps_signs();
         let units = markup.coordinate_units.unwrap_or_else(|| "mm".into());
         let all = units.as_array().map_or(std::slice::from_ref(&units), Vec::as_slice);
         if let Some(other) = all.iter().find(|u| *u != "mm") {

@@ -135,8 +135,8 @@ mod tests {
         let path = folder.path().join("s.toml");
         std::fs::write(&path, text).expect("written");
         let (scene, warnings) = Scene::load(&path, &[]).expect("sound");
-        let said = warnings.iter().map(|w| w.message.clone()).collect();
-        (scene, said)
+        let texts = warnings.iter().map(|w| w.message.clone()).collect();
+        (scene, texts)
     }
 
     fn mesh(name: &str, more: &str) -> String {
@@ -151,9 +151,9 @@ mod tests {
         let text = BEAT.to_owned()
             + &mesh("x", "parent = \"beat\"\nkeyframes = [\"a.obj\", \"b.obj\", \"c.obj\"]")
             + &mesh("y", "file = \"c.obj\"");
-        let (scene, said) = load(&text);
+        let (scene, texts) = load(&text);
         assert_eq!(scene.coincident_triangles(), 12);
-        assert!(said[0].contains("12 triangles of `x` and `y`"), "{said:?}");
+        assert!(texts[0].contains("12 triangles of `x` and `y`"), "{texts:?}");
     }
 
     #[test]
@@ -181,9 +181,9 @@ mod tests {
         let decided = beside.clone() + "priority = 1\n";
         let (scene, silent) = load(&decided);
         assert_eq!((scene.coincident_triangles(), silent.len()), (12, 0));
-        let (scene, said) = load(&beside);
+        let (scene, texts) = load(&beside);
         // Each triangle of z has a twin in x and one in y; it counts once.
         assert_eq!(scene.coincident_triangles(), 12);
-        assert_eq!(said.len(), 1, "{said:?}");
+        assert_eq!(texts.len(), 1, "{texts:?}");
     }
 }

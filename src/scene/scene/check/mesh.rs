@@ -276,10 +276,10 @@ mod tests {
         let mut fin = scaled(100.0);
         fin.positions.push([50.0, 50.0, 200.0]);
         fin.triangles.push([0, 1, 8]);
-        let told = messages(fin);
+        let texts = messages(fin);
         assert!(
-            told[0].contains("2 open edges") && told[1].contains("1 edges at which"),
-            "{told:?}"
+            texts[0].contains("2 open edges") && texts[1].contains("1 edges at which"),
+            "{texts:?}"
         );
 
         // Two cubes that touch along an edge are closed.

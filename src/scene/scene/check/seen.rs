@@ -55,13 +55,13 @@ mod tests {
     fn meshes_beside_the_image_are_told() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("s.toml");
-        let said = |text: &str| {
+        let first_of = |text: &str| {
             let head = "background = \"liver\"\n[probe]\npreset = \"linear\"\n";
             std::fs::write(&path, format!("{head}{text}")).expect("written");
             let (_, warnings) = Scene::load(&path, &[]).expect("sound");
-            let told: Vec<_> =
+            let texts: Vec<_> =
                 warnings.into_iter().filter(|w| w.message.contains("no mesh is")).collect();
-            told.first().map(|w| w.message.clone())
+            texts.first().map(|w| w.message.clone())
         };
         let ball = |name: &str, at: &str| {
             format!(
@@ -70,12 +70,14 @@ mod tests {
             )
         };
         let (near, far) = (ball("near", "0, 0, -50"), ball("far", "0, 400, 20"));
-        assert!(said(&format!("{far}{near}")).is_some_and(|m| m.contains("`near`, lies 45 mm")));
+        assert!(
+            first_of(&format!("{far}{near}")).is_some_and(|m| m.contains("`near`, lies 45 mm"))
+        );
         for one in ["0, 0, 20", "0, 0, 0", "0, 5, 20", "-22, 0, 30"] {
-            assert_eq!(said(&format!("{far}{}", ball("seen", one))), None, "{one}");
+            assert_eq!(first_of(&format!("{far}{}", ball("seen", one))), None, "{one}");
         }
         let wire = "[[wire]]\nfrom = [0, -5, 20]\nto = [0, 5, 20]\n";
-        assert_eq!(said(&format!("{far}{wire}")), None);
-        assert_eq!(said(""), None);
+        assert_eq!(first_of(&format!("{far}{wire}")), None);
+        assert_eq!(first_of(""), None);
     }
 }

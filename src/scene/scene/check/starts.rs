@@ -105,7 +105,7 @@ mod tests {
     fn lines_beside_the_body_are_told() {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("s.toml");
-        let said = |background: &str, radius: f64| {
+        let warnings_of = |background: &str, radius: f64| {
             let text = format!(
                 "background = \"{background}\"\n[probe]\npreset = \"linear\"\n[[mesh]]\nname = \"a\"\n\
                  tissue = \"liver\"\nshape = {{ sphere = {{ radius = {radius} }} }}\n"
@@ -115,9 +115,9 @@ mod tests {
             warnings.into_iter().map(|w| w.count).collect::<Vec<_>>()
         };
         // The face lies in the middle of the sphere: 38.4 mm of it.
-        assert!(said("air", 30.0).is_empty());
-        assert!(said("water", 10.0).is_empty());
-        let counts = said("air", 10.0);
+        assert!(warnings_of("air", 30.0).is_empty());
+        assert!(warnings_of("water", 10.0).is_empty());
+        let counts = warnings_of("air", 10.0);
         assert!(counts.len() == 1 && (10..25).contains(&counts[0]), "{counts:?}");
     }
 
@@ -131,26 +131,27 @@ mod tests {
                  shape = {{ sphere = {{ radius = {radius} }} }}\n"
             )
         };
-        let said = |balls: &[String]| {
+        let warnings_of = |balls: &[String]| {
             let text =
                 format!("background = \"fat\"\n[probe]\npreset = \"linear\"\n{}", balls.concat());
             std::fs::write(&path, text).expect("written");
             let (_, warnings) = Scene::load(&path, &[]).expect("sound");
             warnings.into_iter().filter(|w| w.message.contains("start inside")).collect::<Vec<_>>()
         };
-        let told = said(&[ball("a", "cortical_bone", 30.0, 0)]);
-        assert!(told.len() == 1 && told[0].count == 5, "{told:?}");
-        assert!(told[0].message.contains("`cortical_bone`"), "{told:?}");
+        let found = warnings_of(&[ball("a", "cortical_bone", 30.0, 0)]);
+        assert!(found.len() == 1 && found[0].count == 5, "{found:?}");
+        assert!(found[0].message.contains("`cortical_bone`"), "{found:?}");
         // The face's middle alone.
-        let told = said(&[ball("a", "cortical_bone", 5.0, 0)]);
-        assert!(told.len() == 1 && told[0].count == 1, "{told:?}");
+        let found = warnings_of(&[ball("a", "cortical_bone", 5.0, 0)]);
+        assert!(found.len() == 1 && found[0].count == 1, "{found:?}");
         // Marrow within, other tissue above, bone that does not show.
-        assert!(said(&[ball("a", "liver", 30.0, 0)]).is_empty());
+        assert!(warnings_of(&[ball("a", "liver", 30.0, 0)]).is_empty());
         assert!(
-            said(&[ball("a", "cortical_bone", 30.0, 0), ball("b", "liver", 25.0, 1)]).is_empty()
+            warnings_of(&[ball("a", "cortical_bone", 30.0, 0), ball("b", "liver", 25.0, 1)])
+                .is_empty()
         );
         assert_eq!(
-            said(&[ball("a", "cortical_bone", 30.0, 1), ball("b", "liver", 25.0, 0)]).len(),
+            warnings_of(&[ball("a", "cortical_bone", 30.0, 1), ball("b", "liver", 25.0, 0)]).len(),
             1
         );
     }

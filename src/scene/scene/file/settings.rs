@@ -83,8 +83,8 @@ pub fn load_settings(path: &Path, settings: &mut Settings) -> Result<(), SceneEr
         Probe::TABLE => has_probe,
         table => document.says_of(table, ""),
     };
-    let said: Vec<&str> = Settings::TABLES.iter().copied().filter(says).collect();
-    if said.is_empty() {
+    let stated: Vec<&str> = Settings::TABLES.iter().copied().filter(says).collect();
+    if stated.is_empty() {
         return Err(SceneError::file(
             path,
             format!("says nothing of {}", tables("or")),
@@ -95,7 +95,7 @@ pub fn load_settings(path: &Path, settings: &mut Settings) -> Result<(), SceneEr
         settings.probe = found.probe.clone();
         settings.follow_frequency(frequency);
     }
-    Settings::each(&mut Taking { tables: &said, from: &found, to: settings });
+    Settings::each(&mut Taking { tables: &stated, from: &found, to: settings });
     Ok(())
 }
 

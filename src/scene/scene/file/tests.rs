@@ -151,8 +151,8 @@ fn a_matrix_places_as_its_parts_do() {
         for (text, table) in [(scene(&text, ""), "transform"), (scene("", &text), "mesh")] {
             let error = case.load(&text, &[]).map(|_| ()).expect_err(cause);
             assert!(cause.split('|').any(|c| error.message.contains(c)), "{table}: {error}");
-            let told = error.remedy.as_deref().unwrap_or_default();
-            assert!(told.contains(remedy), "{table}: {told}");
+            let texts = error.remedy.as_deref().unwrap_or_default();
+            assert!(texts.contains(remedy), "{table}: {texts}");
             assert!(error.line > 0, "{error}");
         }
     }
@@ -302,14 +302,14 @@ fn settings_that_keep_something_out_of_the_picture_are_told_with_their_line() {
     let text =
         "[probe]\npreset = \"linear\"\nslice_thickness = 0\n[simulation]\nmin_weight = 0.5\n";
     let (_, warnings) = Case::new().load(text, &[]).expect("in range");
-    let told: Vec<_> = warnings.iter().map(ToString::to_string).collect();
-    for (warning, parts) in told.iter().zip([
+    let texts: Vec<_> = warnings.iter().map(ToString::to_string).collect();
+    for (warning, parts) in texts.iter().zip([
         ["s.toml: line 3: ", "there will be no speckle; ", "give it some mm"],
         ["s.toml: line 5: ", "nothing is seen; ", "give 0.01 or less"],
     ]) {
         assert!(parts.iter().all(|part| warning.contains(part)), "{warning}");
     }
-    assert_eq!(told.len(), 2, "{told:?}");
+    assert_eq!(texts.len(), 2, "{texts:?}");
     let set = [("probe.slice_thickness", "0")];
     let (_, warnings) = Case::new().load("[probe]\npreset = \"linear\"\n", &set).expect("in range");
     assert!(warnings[0].to_string().starts_with("warning: setting: line 1: "), "{warnings:?}");
@@ -321,7 +321,7 @@ fn times_may_have_a_unit() {
         assert_eq!(DURATION.finite(text), Ok(value));
     }
     for (text, cause) in [("4 mm", "`s`, `ms`"), ("soon", "1.5 s"), ("inf", "no duration")] {
-        let said = DURATION.finite(text).expect_err(text);
-        assert!(said.contains(cause), "{said}");
+        let fault = DURATION.finite(text).expect_err(text);
+        assert!(fault.contains(cause), "{fault}");
     }
 }

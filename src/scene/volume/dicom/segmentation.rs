@@ -290,13 +290,13 @@ fn segments(dicom: &Dicom) -> Result<Vec<DicomSegment>, FileError> {
             let code = first(item, tag)?;
             elements.text(code, (0x0008, 0x0104))
         };
-        let said = [
+        let words = [
             elements.text(item, (0x0062, 0x0005)),
             meaning(elements::TYPE),
             meaning(elements::CATEGORY),
         ];
-        let said = said.into_iter().flatten().filter(|t| !t.is_empty());
-        out.push(DicomSegment { number, names: said.map(std::borrow::Cow::into_owned).collect() });
+        let words = words.into_iter().flatten().filter(|t| !t.is_empty());
+        out.push(DicomSegment { number, names: words.map(std::borrow::Cow::into_owned).collect() });
     }
     Ok(out)
 }

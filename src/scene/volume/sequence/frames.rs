@@ -117,11 +117,12 @@ pub(super) fn pixels<'f>(
 }
 
 /// Sizes of pixels in words: "pixels of 0.1 x 0.1 mm, from frame 3 on of 0.2 x 0.2 mm".
-pub(super) fn pixels_told(sizes: &[(usize, [f64; 2])]) -> Option<String> {
+pub(super) fn pixel_sizes(sizes: &[(usize, [f64; 2])]) -> Option<String> {
     let [(_, first), later @ ..] = sizes else { return None };
-    let told = |[x, y]: [f64; 2]| format!("{x} x {y} mm");
-    let later = later.iter().map(|(at, size)| format!(", from frame {at} on of {}", told(*size)));
-    Some(format!("pixels of {}{}", told(*first), later.collect::<String>()))
+    let written = |[x, y]: [f64; 2]| format!("{x} x {y} mm");
+    let later =
+        later.iter().map(|(at, size)| format!(", from frame {at} on of {}", written(*size)));
+    Some(format!("pixels of {}{}", written(*first), later.collect::<String>()))
 }
 
 /// Returns whether the third axis is declared to be of space.

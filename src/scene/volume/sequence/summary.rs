@@ -58,7 +58,7 @@ impl Summary {
             Some([low.min(t), high.max(t)])
         });
         let sizes = frames::pixels(frames.iter().map(|(index, frame)| (*index, frame)));
-        let pixels = frames::pixels_told(&sizes);
+        let pixels = frames::pixel_sizes(&sizes);
         Ok(Some(Self { frames: count, poses, times, pixels }))
     }
 }

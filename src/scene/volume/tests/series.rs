@@ -417,7 +417,7 @@ fn volumes_over_time_read_back_equal() {
     assert_eq!(wrong(&read, Some(0.05)), None);
     let (a, b) = (read.world_from_voxel, volume.world_from_voxel);
     assert!(a.abs_diff_eq(b, 1e-14), "{a:?} {b:?}");
-    let told = read.to_string();
-    assert!(told.contains("3 volumes over time, one every 0.05 s"), "{told}");
-    assert!(told.contains("values -1500 to 623"), "{told}");
+    let text = read.to_string();
+    assert!(text.contains("3 volumes over time, one every 0.05 s"), "{text}");
+    assert!(text.contains("values -1500 to 623"), "{text}");
 }

@@ -52,6 +52,6 @@ pub fn spirv_val(stem: &str, spirv: &[u8], target: &str) -> Result<bool, Error> 
     if output.status.success() {
         return Ok(true);
     }
-    let said = [output.stdout, output.stderr].concat();
-    Err(invalid(String::from_utf8_lossy(&said).trim().to_owned()))
+    let text = [output.stdout, output.stderr].concat();
+    Err(invalid(String::from_utf8_lossy(&text).trim().to_owned()))
 }

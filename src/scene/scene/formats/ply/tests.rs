@@ -92,8 +92,8 @@ fn planted_faults_are_named() {
         let broken = text.replace(from, to);
         assert_ne!(broken, text);
         let issues = load(broken).expect_err(cause);
-        let told = issues[0].to_string();
-        assert!(cause.split('|').any(|cause| told.contains(cause)), "{cause}: {told}");
+        let message = issues[0].to_string();
+        assert!(cause.split('|').any(|cause| message.contains(cause)), "{cause}: {message}");
     }
     let whole = binary(false);
     for cut in [whole.len() - 1, whole.len() - 20, header("ascii").len()] {

@@ -77,8 +77,8 @@ fn planted_faults_are_named() {
     ] {
         let broken = model.replace(from, to);
         assert_ne!(broken, model, "{from}");
-        let told = load(&broken).expect_err(cause)[0].to_string();
-        assert!(told.contains(cause), "{cause}: {told}");
+        let message = load(&broken).expect_err(cause)[0].to_string();
+        assert!(message.contains(cause), "{cause}: {message}");
     }
     assert!(read(Path::new("x.3mf"), b"PK\x03\x04").is_err());
     assert!(read(Path::new("x.3mf"), &archive(&[])).is_err());

@@ -93,8 +93,8 @@ fn planted_faults_are_named() {
     ] {
         let broken = text.replace(from, to);
         assert_ne!(broken, text, "{from}");
-        let told = load(broken).expect_err(cause)[0].to_string();
-        assert!(told.contains(cause), "{cause}: {told}");
+        let message = load(broken).expect_err(cause)[0].to_string();
+        assert!(message.contains(cause), "{cause}: {message}");
     }
     let whole = binary(true);
     for cut in [whole.len() - 2, whole.len() - 40, 150] {

@@ -172,8 +172,8 @@ fn planted_faults_are_named() {
     ] {
         let broken = text.replacen(from, to, 1);
         assert_ne!(broken, text, "{from}");
-        let told = load(broken).map_or_else(|e| e[0].to_string(), |_| String::new());
-        assert!(told.contains(cause), "{cause}: {told}");
+        let message = load(broken).map_or_else(|e| e[0].to_string(), |_| String::new());
+        assert!(message.contains(cause), "{cause}: {message}");
     }
     assert!(load("<a/>").expect_err("none")[0].message.contains("is no VTK file"));
     let packed = Writer { way: Way::AppendedRaw, wide: true, packed: true, appended: Vec::new() };
