@@ -42,6 +42,9 @@ impl Frame {
     }
 }
 
+/// Part of a length by which two statements of it may differ: single precision and rounded headers.
+pub(super) const UNEQUAL: f64 = 0.01;
+
 /// Position of voxels in the frame and the unit of a file.
 pub(super) struct Grid {
     /// Step from one voxel to the next along each axis.

@@ -3,8 +3,10 @@
 
 use std::path::Path;
 
+use glam::DVec3;
+
 use super::fields::{Field, Fields};
-use super::grid::{self, Frame, Grid};
+use super::grid::{self, Frame, Grid, UNEQUAL};
 use super::header::{Header, unused};
 use super::layout::{Axis, Layout};
 use super::scalar::Scalar;
@@ -89,6 +91,8 @@ pub(super) fn of_fields(fields: &Fields, data: u64) -> Result<Header, FileError>
     let rows: Vec<f64> = rows.transpose()?.unwrap_or_else(identity);
     let origin = fields.find(&ORIGIN).map(|f| fields.numbers(f, n));
     let origin: Vec<f64> = origin.transpose()?.unwrap_or_default();
+    let steps = grid::steps(n, &rows, &spacings);
+    let warnings = stretched(fields.path, &steps, &spacings).into_iter().collect();
     let channels = match fields.find(&["ElementNumberOfChannels"]) {
         Some(field) => fields.sizes(field, 1)?[0],
         None => 1,
@@ -103,16 +107,23 @@ pub(super) fn of_fields(fields: &Fields, data: u64) -> Result<Header, FileError>
         big_endian,
         layout: Layout::new([(Axis::Values, channels)].into_iter().chain(axes)),
         interval,
-        grid: Grid {
-            steps: grid::steps(n, &rows, &spacings),
-            origin: grid::point(&origin),
-            frame: Frame::Lps,
-            unit: unit(fields)?,
-        },
+        grid: Grid { steps, origin: grid::point(&origin), frame: Frame::Lps, unit: unit(fields)? },
         scale: None,
         payload: payload(fields, data)?,
-        warnings: Vec::new(),
+        warnings,
     })
+}
+
+/// The warning of a direction whose axes are not of length 1, so that voxels are of another size than the spacing says.
+fn stretched(path: &Path, steps: &[DVec3; 3], spacings: &[f64]) -> Option<Warning> {
+    let sizes = steps.iter().zip(spacings).map(|(step, spacing)| (step.length(), *spacing));
+    let (size, spacing) = sizes
+        .into_iter()
+        .find(|(size, spacing)| (size - spacing).abs() > UNEQUAL * spacing.abs())?;
+    let message = format!(
+        "an axis of TransformMatrix is not of length 1: voxels are {size:.3} apart along it, and ElementSpacing says {spacing:.3}"
+    );
+    Some(Warning::warning(path, 1, message, "export it with axes of length 1"))
 }
 
 /// Fields up to the one with the place of the voxels, and the byte after it.

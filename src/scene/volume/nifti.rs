@@ -6,7 +6,7 @@ use std::path::Path;
 use glam::{DQuat, DVec3};
 
 use super::Format;
-use super::grid::{Frame, Grid};
+use super::grid::{Frame, Grid, UNEQUAL};
 use super::header::Header;
 use super::layout::{Axis, Layout};
 use super::scalar::Scalar;
@@ -283,9 +283,6 @@ fn placed(raw: &Raw, dims: &[usize]) -> Result<Placed, FileError> {
     let grid = Grid { steps, origin, frame: Frame::Ras, unit };
     Ok(Placed { grid, stated: stated.is_some(), warnings })
 }
-
-/// Part of a length by which two statements of it may differ: single precision and rounded headers.
-const UNEQUAL: f64 = 0.01;
 
 /// The position by the quaternion.
 fn qform(raw: &Raw) -> Result<Frames, FileError> {

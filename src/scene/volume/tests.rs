@@ -234,6 +234,25 @@ fn bounds_spacing_and_values_are_those_of_whole_voxels() {
 }
 
 #[test]
+fn directions_that_scale_are_warned_of() {
+    let folder = Folder::new();
+    let file = meta(LOCAL, &bytes(false));
+    let text = String::from_utf8_lossy(&file[..]).into_owned();
+    let row = text.lines().find(|line| line.starts_with("TransformMatrix")).expect("a direction");
+    let (key, numbers) = row.split_once('=').expect("a key");
+    let doubled: Vec<String> = numbers
+        .split_whitespace()
+        .map(|n| (2.0 * n.parse::<f64>().expect("a number")).to_string())
+        .collect();
+    let at = text.find(row).expect("there");
+    let scaled = format!("{key}= {}", doubled.join(" "));
+    let file = [&file[..at], scaled.as_bytes(), &file[at + row.len()..]].concat();
+    let (_, warnings) = folder.load("scaled.mha", &file).expect("a volume");
+    let text: Vec<_> = warnings.iter().map(ToString::to_string).collect();
+    assert!(text.len() == 1 && text[0].contains("not of length 1"), "{text:?}");
+}
+
+#[test]
 fn extra_keys_channels_and_trailing_bytes_are_warned_of() {
     let folder = Folder::new();
     let more =
