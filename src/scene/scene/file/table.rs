@@ -59,20 +59,22 @@ pub(super) fn keys<T: Group>(
 
 /// The keys of a group with defaults, like [`keys`].
 pub(super) fn defaults<T: Group + Default>(below: &'static str) -> impl Iterator<Item = Key> {
-    let value = |row: &Row<T>| match (row.facts.default, (row.get)(&T::default())) {
-        (None, Value::Text(text)) => format!("`{text}`"),
-        (None, value) => {
-            let text = row.facts.text(&value).map(|text| match row.facts.form {
-                Form::Quantity(_) => format!("`{}`", text.trim_matches('"')),
-                _ => format!("`{text}`"),
-            });
-            text.unwrap_or_default()
-        }
-        (Some(words), _) => words.to_owned(),
-    };
-    let usual = |row: &Row<T>| row.facts.default.is_none().then(|| (row.get)(&T::default()));
-    let all = keys::<T>(below, "").zip(T::rows());
-    all.map(move |(key, row)| Key { default: value(row), usual: usual(row), ..key })
+    let own = T::default();
+    keys::<T>(below, "").zip(T::rows()).map(move |(key, Row { facts, get, .. })| {
+        let value = get(&own);
+        let default = match (facts.default, &value) {
+            (None, Value::Text(text)) => format!("`{text}`"),
+            (None, value) => {
+                let text = facts.text(value).map(|text| match facts.form {
+                    Form::Quantity(_) => format!("`{}`", text.trim_matches('"')),
+                    _ => format!("`{text}`"),
+                });
+                text.unwrap_or_default()
+            }
+            (Some(words), _) => words.to_owned(),
+        };
+        Key { default, usual: facts.default.is_none().then_some(value), ..key }
+    })
 }
 
 /// A table with the keys of `K`.
