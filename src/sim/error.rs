@@ -1,9 +1,9 @@
-//! Why a scene cannot be simulated.
+//! Errors of the simulation.
 
 use super::world::WorldError;
 use crate::gpu::GpuError;
 
-/// Why a scene cannot be simulated.
+/// The reason why a scene cannot be simulated.
 #[derive(Debug, thiserror::Error)]
 pub enum SimError {
     /// The Vulkan layer failed.

@@ -1,4 +1,4 @@
-//! Why there is no window, or no more; the text of an error in a scene.
+//! Errors of the window, and the text of one in a scene.
 
 use std::path::PathBuf;
 

@@ -23,7 +23,7 @@ pub(super) struct Leaving {
     pub(super) problem: Option<String>,
 }
 
-/// How far an exit has come.
+/// Progress of an exit.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Stage {
     /// The question has not been drawn yet.

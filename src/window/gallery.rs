@@ -16,7 +16,7 @@ const PICTURE: egui::Vec2 = vec2(190.0, 130.0);
 /// Pictures in a row.
 const COLUMNS: usize = 3;
 
-/// What to do first, in three lines.
+/// First steps, in three lines.
 pub const FIRST_STEPS: [&str; 3] = [
     "Drag the probe on the skin in the 3D view, or slide it by the arrow keys; Shift leans it, Ctrl and the wheel turn it.",
     "Space freezes the image, L measures a distance in it, F2 saves it with its settings.",

@@ -1,4 +1,4 @@
-//! What the window is opened with.
+//! Options of the window.
 
 use std::net::IpAddr;
 use std::path::PathBuf;
@@ -15,7 +15,7 @@ use crate::sim::shaders::Library;
 pub struct Options {
     /// The scene file.
     pub file: PathBuf,
-    /// What is suspicious about the scene, as loading it has told.
+    /// Warnings about the scene, as loading it has given them.
     pub warnings: Vec<String>,
     /// Settings of the command line, which replace those of the file.
     pub overrides: Vec<(String, String)>,

@@ -28,7 +28,7 @@ pub struct Skins {
 
 impl Skins {
     /// The skin of `scene` with the shapes and placements of now; empty without `contact` or while none of it
-    /// is shown. A scene with other meshes needs its own `Skins`.
+    /// is shown. Trees are built again where a mesh has another shape.
     pub fn of(&mut self, scene: &Scene) -> Skin {
         let named = scene.contact.iter().flat_map(|c| &c.skin);
         let placed = named.map(|&i| &scene.instances[i]).filter(|i| i.shown);
