@@ -1,7 +1,7 @@
 //! The worksheet of the examination, and its report.
 
 use dicom_core::chrono::Local;
-use egui::{Context, Grid, Key, RichText, ScrollArea, TextEdit, Ui};
+use egui::{Context, Event, Grid, InputState, Key, Pos2, RichText, ScrollArea, TextEdit, Ui};
 
 use super::model::Model;
 use super::model::sheet::What;
@@ -68,6 +68,14 @@ pub(super) fn worksheet(model: &Model) -> Worksheet {
     Worksheet::of(model.settings.imaging.exam, &measured.collect::<Vec<_>>())
 }
 
+/// Where a button of the pointer has been pressed since the last drawing; egui forgets it where it has been let go, too.
+fn pressed_at(input: &InputState) -> Option<Pos2> {
+    input.events.iter().rev().find_map(|event| match event {
+        Event::PointerButton { pos, pressed: true, .. } => Some(*pos),
+        _ => None,
+    })
+}
+
 impl Panel for Examination {
     fn row(&self) -> &'static Row {
         &ROW
@@ -86,9 +94,7 @@ impl Panel for Examination {
 
     fn show(&mut self, ui: &mut Ui, desk: &mut Desk<'_>) {
         let Desk { model, common, .. } = desk;
-        let pressed =
-            ui.input(|input| input.pointer.any_pressed().then(|| input.pointer.press_origin()));
-        if let Some(Some(at)) = pressed {
+        if let Some(at) = ui.input(pressed_at) {
             common.fills |= ui.max_rect().contains(at);
         }
         let tools = &mut common.tools;
@@ -192,5 +198,35 @@ fn report(model: &Model, exam: &Examination, worksheet: Worksheet) -> Report {
         worksheet,
         pictures: Vec::new(),
         findings: exam.findings.clone(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use egui::{Modifiers, PointerButton, RawInput, pos2};
+
+    /// On a slow machine press and release lie between two drawings, and what is typed next would be keys.
+    #[test]
+    fn a_click_that_has_ended_is_known_by_where_it_began() {
+        let button = |x: f32, pressed: bool| Event::PointerButton {
+            pos: pos2(x, 50.0),
+            button: PointerButton::Primary,
+            pressed,
+            modifiers: Modifiers::NONE,
+        };
+        for (events, expected) in [
+            (vec![button(30.0, true)], Some(pos2(30.0, 50.0))),
+            (vec![button(30.0, true), button(30.0, false)], Some(pos2(30.0, 50.0))),
+            (vec![button(30.0, false)], None),
+            (vec![], None),
+        ] {
+            let context = Context::default();
+            let mut found = None;
+            let input = RawInput { events: events.clone(), ..RawInput::default() };
+            let mut output = context.run_ui(input, |ui| found = ui.input(pressed_at));
+            output.textures_delta.clear();
+            assert_eq!(found, expected, "{events:?}");
+        }
     }
 }
