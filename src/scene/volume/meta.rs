@@ -100,7 +100,7 @@ pub(super) fn of_fields(fields: &Fields, data: u64) -> Result<Header, FileError>
     let kinds = [Axis::Space, Axis::Space, Axis::Space, Axis::Time];
     let kinds = kinds.into_iter().chain(std::iter::repeat(Axis::Values));
     let axes = kinds.zip(dims);
-    let big_endian = fields.find(&BIG_ENDIAN).is_some_and(truth);
+    let big_endian = switch(fields, &BIG_ENDIAN)?.unwrap_or(false);
     Ok(Header {
         format: Format::MetaImage,
         kind: kind(fields)?,
@@ -156,8 +156,17 @@ pub(super) fn fields(path: &Path) -> Result<(Fields<'_>, u64), FileError> {
     ))
 }
 
-fn truth(field: &Field) -> bool {
-    ["true", "1", "t", "y", "yes"].contains(&field.value.to_ascii_lowercase().as_str())
+/// Whether the first of these keys that is there says yes; none where there is none of them. A word that is
+/// neither is refused: `Talse` is yes to programs that look at its first letter and no to others.
+fn switch(fields: &Fields, keys: &[&str]) -> Result<Option<bool>, FileError> {
+    let Some(field) = fields.find(keys) else {
+        return Ok(None);
+    };
+    match field.value.to_ascii_lowercase().as_str() {
+        "true" | "t" | "yes" | "y" | "1" => Ok(Some(true)),
+        "false" | "f" | "no" | "n" | "0" => Ok(Some(false)),
+        _ => Err(fields.error(field, "is neither True nor False", "write True or False")),
+    }
 }
 
 /// Types that are read, by their names; those that are written come first.
@@ -205,8 +214,8 @@ fn payload(fields: &Fields, after_header: u64) -> Result<Payload, FileError> {
         false => (fields.detached(place)?, 0),
     };
     let skip = fields.skip(&["HeaderSize"], true)?;
-    let compressed = fields.find(&["CompressedData"]).is_some_and(truth);
-    let text = fields.find(&["BinaryData"]).is_some_and(|f| !truth(f));
+    let compressed = switch(fields, &["CompressedData"])?.unwrap_or(false);
+    let text = !switch(fields, &["BinaryData"])?.unwrap_or(true);
     Ok(Payload {
         file,
         offset,
