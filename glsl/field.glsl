@@ -13,6 +13,13 @@ uint field_of(uint instance) {
     return instances[instance].field;
 }
 
+// Offset of what flows in an instance, in vectors: of a generation of scatterers its weight, its number and the distance to the
+// next one's (0: it is the last), before its field. 0: nothing flows.
+uint flow_of(uint instance) {
+    if (instance == NONE || (frame.flags & FLAG_WORLD_TEXTURE) != 0u) return 0u;
+    return instances[instance].flow;
+}
+
 // An includer with more than one set of fields says which is read.
 #ifndef FIELD_VECTOR
 #define FIELD_VECTOR(i) fields[i].xyz
@@ -58,6 +65,25 @@ vec3 displaced(Field f, vec3 p) {
     return p + displacement(f, p, gradient);
 }
 
+// The fields by which tissue comes from where it rests to where it is now: blood is carried by its flow first, and then with
+// what it is in. NONE: none.
+struct Motion { uint flow; uint field; };
+
+uint motion_field(Motion m, uint i) { return i == 0u ? m.flow : m.field; }
+
+// Where the tissue that rests at p is now, and the derivative of that by p.
+vec3 moved(Motion m, vec3 p, out mat3 jacobian) {
+    jacobian = mat3(1.0);
+    for (uint i = 0u; i < 2u; ++i) {
+        uint at = motion_field(m, i);
+        if (at == NONE) continue;
+        mat3 gradient;
+        p += displacement(load_field(at), p, gradient);
+        jacobian += gradient * jacobian;
+    }
+    return p;
+}
+
 // Solves jacobian x = b; returns b where the field folds.
 vec3 undeform(mat3 jacobian, vec3 b) {
     vec3 across = cross(jacobian[1], jacobian[2]);
@@ -76,6 +102,15 @@ vec3 reference_point(Field f, vec3 p) {
         found += undeform(mat3(1.0) + gradient, miss);
     }
     return found;
+}
+
+// Where the tissue that is at p now rests.
+vec3 rest_of(Motion m, vec3 p) {
+    for (uint i = 0u; i < 2u; ++i) {
+        uint at = motion_field(m, 1u - i);
+        if (at != NONE) p = reference_point(load_field(at), p);
+    }
+    return p;
 }
 
 // The map from the world to the reference shape, for the tissue at p.

@@ -5,6 +5,9 @@
 // at the beam's edge may be missed.
 const float MOST_SQUEEZED = 2.5;
 
+const uint GENERATIONS = 2u;
+const uint GENERATION_KEY = 0x9e3779b9u;   // 2^32 over the golden ratio: lattices of successive numbers lie far from each other
+
 vec3 bounded(vec3 v) { return v * min(1.0, MOST_SQUEEZED * inversesqrt(max(dot(v, v), 1e-12))); }
 
 // Echo of a scatterer of deformed tissue at `rel` from the stretch's origin, if it is within the strip, the
@@ -29,19 +32,26 @@ uvec2 hear(Stretch s, vec3 rel, float strength, int number, vec2 x, float drowne
     return uvec2(1u, deposit_near(kappa, strength * exp2(exponent) * phasor(-turns)));
 }
 
+// Scatterers of deformed tissue that were set out together.
+struct Scatterers {
+    Motion motion;
+    float weight;        // factor on their amplitudes
+    uint number;         // of the generation; 0 where nothing flows
+};
+
 // Scatterers of one lattice of deformed tissue between two distances. Cells are found where the piece lies
 // in the reference shape: by the affine map at its middle, in a box that the map's error widens. Each scatterer
 // then echoes from its true place, in the piece that holds it.
-uvec3 march_piece(Stretch s, int number, vec2 x, float drowned) {
+uvec3 march_piece(Stretch s, Scatterers group, int number, vec2 x, float drowned) {
     Lattice lattice = lattice_of(s.tissue, number);
+    // Each generation has scatterers of its own.
+    lattice.key += uvec3(group.number * GENERATION_KEY);
     float h = lattice.edge, inverse_h = lattice.inverse_edge;
-    Field f = load_field(field_of(s.instance));
     float half_length = 0.5 * (x.y - x.x);
     vec3 here = s.o + (x.x + half_length) * s.d;
-    vec3 p = reference_point(f, here);
+    vec3 p = rest_of(group.motion, here);
     mat3 jacobian;
-    vec3 back = here - p - displacement(f, p, jacobian);
-    jacobian += mat3(1.0);
+    vec3 back = here - moved(group.motion, p, jacobian);
     vec3 middle = p + undeform(jacobian, back);
     float width = 1.1 * end_width(s, x);
     if (!(width > 0.0)) return uvec3(0u);
@@ -56,8 +66,9 @@ uvec3 march_piece(Stretch s, int number, vec2 x, float drowned) {
     for (uint i = 0u; i < 8u; ++i) {
         vec3 side = (2.0 * vec3(i & 1u, (i >> 1u) & 1u, i >> 2u) - 1.0) * half_size;
         vec3 off = side.x * d + side.y * el + side.z * ee;
-        vec3 moved = displaced(f, middle + off) - here;
-        vec3 miss = vec3(dot(moved, s.d) - dot(off, along), dot(moved, s.e_l) - dot(off, across), dot(moved, s.e_e) - dot(off, up));
+        mat3 unused;
+        vec3 to = moved(group.motion, middle + off, unused) - here;
+        vec3 miss = vec3(dot(to, s.d) - dot(off, along), dot(to, s.e_l) - dot(off, across), dot(to, s.e_e) - dot(off, up));
         least = min(least, miss);
         most = max(most, miss);
     }
@@ -78,7 +89,7 @@ uvec3 march_piece(Stretch s, int number, vec2 x, float drowned) {
     ivec3 base = ivec3(nearest);
     // Squeezed tissue keeps its echo level though its scatterers are closer together.
     float growth = abs(dot(jacobian[0], cross(jacobian[1], jacobian[2])));
-    float strength = lattice.amplitude * s.weight * frame.volume_scale * sqrt(clamp(growth, LEAST_GROWTH, 1.0 / LEAST_GROWTH));
+    float strength = group.weight * lattice.amplitude * s.weight * frame.volume_scale * sqrt(clamp(growth, LEAST_GROWTH, 1.0 / LEAST_GROWTH));
     float depth = tissues[s.tissue].texture_depth, length_inverse = 1.0 / tissues[s.tissue].texture_length;
     ivec3 step_a = unit_step(walk.a), step_b = unit_step(walk.b), step_c = unit_step(walk.c);
     float planes = far / abs(walk.step);
@@ -114,7 +125,8 @@ uvec3 march_piece(Stretch s, int number, vec2 x, float drowned) {
                 found = counts && present(lattice, bits) && all(lessThanEqual(about, half_box));
             }
             if (!found) continue;
-            vec3 from = displaced(f, centre + rel) - s.o;
+            mat3 unused;
+            vec3 from = moved(group.motion, centre + rel, unused) - s.o;
             if (depth > 0.0) {
                 // That of the axis beside the scatterer, as in march_planes.
                 vec3 on_axis = middle + (dot(from, s.d) - x.x - half_length) * d;
@@ -122,6 +134,23 @@ uvec3 march_piece(Stretch s, int number, vec2 x, float drowned) {
             }
             count.yz += hear(s, from, signed_strength, number, x, drowned);
         }
+    }
+    return count;
+}
+
+// Scatterers of the lattices from one number to another, of both generations where something flows.
+uvec3 march_generations(Stretch s, ivec2 numbers, vec2 x, float drowned) {
+    uvec3 count = uvec3(0u);
+    uint at = flow_of(s.instance);
+    Scatterers group = Scatterers(Motion(NONE, field_of(s.instance)), 1.0, 0u);
+    for (uint i = 0u; i < GENERATIONS; ++i) {
+        if (at != 0u) {
+            vec3 head = field_vector(at);
+            group = Scatterers(Motion(at + 1u, group.motion.field), head.x, uint(whole(head.y)));
+            at = head.z > 0.0 ? at + uint(whole(head.z)) : 0u;
+        }
+        for (int number = numbers.x; number <= numbers.y; ++number) count += march_piece(s, group, number, x, drowned);
+        if (at == 0u) break;
     }
     return count;
 }

@@ -6,7 +6,8 @@ uvec3 march_sample(Stretch s, int k) {
     float x = distance_at(s, float(k));
     if (!(x >= 0.0 && x < s.extent)) return uvec3(0u);
     vec3 p = s.o + x * s.d;
-    if (deforms(s)) p = reference_point(load_field(field_of(s.instance)), p);
+    // Voxels are carried by no flow.
+    if (deforms(s)) p = rest_of(Motion(NONE, field_of(s.instance)), p);
     ivec3 cell = ivec3(floor(p / frame.cell));
     uint seed = tissues[s.tissue].seed;
     uvec4 bits = pcg4d(uvec4(uvec3(cell), seed));

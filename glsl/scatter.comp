@@ -72,7 +72,7 @@ Stretch texture_stretch(uint at) {
     return s;
 }
 
-bool deforms(Stretch s) { return DEFORMING && field_of(s.instance) != NONE; }
+bool deforms(Stretch s) { return DEFORMING && (field_of(s.instance) != NONE || flow_of(s.instance) != 0u); }
 
 // Parts of a bin that are searched one by one: in deformed tissue, several.
 uint items_of(Stretch s) { return deforms(s) ? SCATTER_BIN / frame.piece : 1u; }
@@ -297,14 +297,11 @@ uvec3 march_bin(Stretch s, int bin, int piece) {
     int number = whole(floor(max(lowest - 0.05, 0.0)));
     int coarsest = whole(floor(min(highest + 0.05 + LEVEL_FADE, float(LATTICE_LEVELS))));
     uvec3 count = uvec3(0u);
+    if (field) return march_generations(s, ivec2(number, coarsest), x, drowned);
     for (; number <= coarsest; ++number) {
-        if (field) {
-            count += march_piece(s, number, x, drowned);
-        } else {
-            // Planes that are crossed beyond the ends may have scatterers within them.
-            float margin = plane_margin(s, x, number);
-            count += march_planes(s, number, x + margin * mix(vec2(0.0), vec2(-1.0, 1.0), bvec2(first, last)), drowned);
-        }
+        // Planes that are crossed beyond the ends may have scatterers within them.
+        float margin = plane_margin(s, x, number);
+        count += march_planes(s, number, x + margin * mix(vec2(0.0), vec2(-1.0, 1.0), bvec2(first, last)), drowned);
     }
     return count;
 }

@@ -168,6 +168,8 @@ struct Instance {
     uint masks;                        // 1: it is part of the fusion's mask
     uint owners;                       // offset in triangles[], words, of the list of each triangle's instance; 0: all its own
     float finest;                      // mm: standard deviation of the finest average in `smoothed`
+    uint flow;                         // offset of what flows in it, in vectors of the fields; 0: nothing
+    uint unused0; uint unused1; uint unused2;
 };
 
 // Per axial sample k, at depth k * sample_pitch.

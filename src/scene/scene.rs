@@ -12,6 +12,7 @@ pub mod animation;
 pub mod check;
 pub mod contact;
 pub mod file;
+pub mod flow;
 mod formats;
 pub mod fusion;
 pub mod graph;
@@ -43,6 +44,7 @@ mod wire;
 pub use crate::issue::{Issue, Severity, Warning};
 pub use contact::Contact;
 pub use file::SceneError;
+pub use flow::Flow;
 pub use fusion::Acquired;
 pub use graph::Graph;
 pub use instance::Instance;
@@ -94,6 +96,8 @@ pub struct Scene {
     pub contact: Option<Contact>,
     /// The tracked tool that may move the probe.
     pub tracker: Tracker,
+    /// Blood that flows, at most one flow for an instance.
+    pub flows: Vec<Flow>,
     /// Live quality while something moves.
     pub live: Live,
     /// Places of its parts in the scene file.
@@ -135,6 +139,7 @@ impl Scene {
             contact: None,
             tracker: Tracker::default(),
             live: Live::default(),
+            flows: Vec::new(),
             origins: Origins::default(),
         }
     }

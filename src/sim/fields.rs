@@ -17,6 +17,7 @@
 //! instance's row whenever keyframes or settings have changed. Each instance has one field more, for the shape
 //! between keyframes; before a frame it is overwritten as [`Fields::blend`] says.
 
+mod flows;
 mod grid;
 mod solve;
 
@@ -29,6 +30,9 @@ use super::layout::NONE;
 use super::placement::rigid;
 use crate::scene::{Instance, Mesh, Scene, Strategy};
 use crate::settings::TextureSpace;
+pub(super) use flows::Carried;
+use flows::FlowSlots;
+pub use flows::GENERATION;
 pub use grid::Grid;
 use solve::{Patch, Solver};
 
@@ -44,6 +48,8 @@ pub struct Fields {
     slots: Vec<Option<FieldOffsets>>,
     /// For each instance its placement at rest; none where no placement scales it in time.
     rests: Vec<Option<DAffine3>>,
+    /// For each instance what flows in it.
+    flows: Vec<Option<FlowSlots>>,
 }
 
 /// The places of one instance's fields in the values; the fields follow each other.
@@ -83,6 +89,7 @@ impl Fields {
             fields.slots.push(slots);
         }
         fields.follow(scene);
+        fields.add_flows(scene);
         fields
     }
 
@@ -92,6 +99,7 @@ impl Fields {
             values: Vec::new(),
             slots: vec![None; scene.instances.len()],
             rests: vec![None; scene.instances.len()],
+            flows: vec![None; scene.instances.len()],
         }
     }
 

@@ -278,6 +278,7 @@ shared! {
         first_triangle: u32, triangles: u32, bvh_root: u32, slot: u32,
         low: [f32; 4], high: [f32; 4],
         field: u32, masks: u32, owners: u32, finest: f32,
+        flow: u32, unused0: u32, unused1: u32, unused2: u32,
     }
     /// Constants of one axial sample.
     struct Row {

@@ -3,6 +3,7 @@
 mod arrays;
 mod changing;
 mod entry;
+mod flowing;
 mod joined;
 mod live;
 mod past;
@@ -12,7 +13,7 @@ mod top;
 use std::sync::Arc;
 
 use super::bvh::{BvhError, Splits};
-use super::fields::{Fields, padded};
+use super::fields::{Carried, Fields, padded};
 use super::layout;
 use super::memory::Memory;
 use super::pass::Array;
@@ -20,7 +21,7 @@ use super::shaders::Library;
 use super::stages::inputs;
 use super::tracer::Tracer;
 use crate::gpu::{Binding, Buffer, BufferKind, Commands, Device, GpuError, Kernel, Stage};
-use crate::scene::{Keyframes, Scene, Strategy};
+use crate::scene::{Flow, Keyframes, Scene, Strategy};
 pub use arrays::GeometryArrays;
 use arrays::GeometryRange;
 use changing::ChangingInstances;
@@ -70,6 +71,9 @@ pub struct World {
     revisions: Vec<u64>,
     /// The keyframes for which the memory was made; present shapes do not matter.
     made_for: Vec<Keyframes>,
+    /// The flows for which the memory was made, and what of them is on the device.
+    flows: Vec<Flow>,
+    carried: Vec<Carried>,
     kernels: Arc<ShapeKernels>,
 }
 
@@ -148,11 +152,13 @@ impl World {
             return Err(WorldError::Selector(node.name.clone()));
         }
         // The kernels of the first update are compiled while the rest is made.
-        if scene.instances.iter().any(|i| i.keyframes.strategy.needs_shared_topology()) {
+        let reshapes = |i: &crate::scene::Instance| i.keyframes.strategy.needs_shared_topology();
+        let reshaped = scene.instances.iter().any(reshapes);
+        if reshaped || !scene.flows.is_empty() {
             kernels.interpolate.prepare();
-            if tracer == Tracer::Bvh {
-                kernels.refit.prepare();
-            }
+        }
+        if reshaped && tracer == Tracer::Bvh {
+            kernels.refit.prepare();
         }
         let most = device.limits().max_storage_buffer_bytes;
         let arrays = GeometryArrays::within(most, scene, tracer, splits, fields, &apart)?;
@@ -190,6 +196,8 @@ impl World {
             past: None,
             revisions: scene.instances.iter().map(|i| i.keyframes.revision).collect(),
             made_for: scene.instances.iter().map(|i| i.keyframes.clone()).collect(),
+            flows: scene.flows.clone(),
+            carried: Vec::new(),
             kernels: Arc::clone(kernels),
         };
         let mut failed = None;
@@ -207,7 +215,12 @@ impl World {
             made.deforms_as(now) && made.strategy == now.strategy
         };
         let refracts = self.averaged || !arrays::averages(scene);
-        refracts && self.agrees(scene, same) && self.sets.hold(scene)
+        refracts && self.agrees(scene, same) && self.flows_as(scene) && self.sets.hold(scene)
+    }
+
+    fn flows_as(&self, scene: &Scene) -> bool {
+        let flows = self.flows.iter().zip(&scene.flows);
+        self.flows.len() == scene.flows.len() && flows.into_iter().all(|(a, b)| a.is_same(b))
     }
 
     fn agrees(&self, scene: &Scene, same: impl Fn(&Keyframes, &Keyframes) -> bool) -> bool {
@@ -222,7 +235,7 @@ impl World {
     /// # Errors
     /// Those of [`Self::new`]; the world then is what it was.
     pub fn exchange(&mut self, device: &Arc<Device>, scene: &Scene) -> Result<(), WorldError> {
-        let fields = match self.agrees(scene, Keyframes::deforms_as) {
+        let fields = match self.agrees(scene, Keyframes::deforms_as) && self.flows_as(scene) {
             true => self.fields.clone(),
             false => Fields::build(scene),
         };
@@ -285,7 +298,8 @@ impl World {
             let at = (size_of::<[f32; 4]>() * range.start) as u64;
             commands.write(&self.geometry.fields, at, bytemuck::cast_slice(&vectors))?;
         }
-        let changed = reshaped || placed || rewritten || !squeezed.is_empty();
+        let flowed = self.carry(commands, scene)?;
+        let changed = reshaped || placed || rewritten || !squeezed.is_empty() || flowed;
         if changed {
             commands.barrier(Stage::Transfer, Stage::Compute);
         }
@@ -344,7 +358,7 @@ impl World {
         buffer.map(Binding::Buffer)
     }
 
-    /// True if the tissue of any instance deforms.
+    /// True if the tissue of any instance deforms, or blood flows in it.
     pub fn deforms(&self) -> bool {
         !self.fields.is_empty()
     }

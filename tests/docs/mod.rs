@@ -67,7 +67,7 @@ fn the_reference_says_what_the_program_does() {
 #[test]
 fn the_examples_of_the_reference_load() {
     let real = document();
-    assert_eq!(real.matches("```toml").count(), 3);
+    assert_eq!(real.matches("```toml").count(), 4);
     assert_eq!(of_examples(&real), [""; 0]);
     let wrong = real.replace("paths = 16", "pathz = 16");
     assert_eq!(of_examples(&wrong).len(), 1);

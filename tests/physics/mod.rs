@@ -14,6 +14,7 @@ mod conversion;
 mod detection;
 mod determinism;
 mod energy;
+mod flow;
 mod formation;
 mod full_wave;
 mod fusion;

@@ -82,6 +82,9 @@ rows! {
     vessel::speckle_behind_a_round_vessel_is_as_bright_as_waves_make_it,
     strips::speckle_is_as_bright_however_refraction_parts_the_paths ("long: ./tools/test.sh --long"),
     chain::enhanced_speckle_has_the_deviation_of_its_correlation,
+    flow::blood_decorrelates_and_turns_as_its_velocity_says,
+    flow::a_vessel_has_the_profile_that_the_beam_smooths,
+    flow::blood_is_as_loud_at_every_time,
 }
 
 #[test]
@@ -92,7 +95,7 @@ fn rows_are_in_order_and_names_are_unique() {
         digits.parse().expect(c.row)
     };
     assert!(checks.is_sorted_by_key(number));
-    assert!(checks.iter().all(|c| (1..=40).contains(&number(c))));
+    assert!(checks.iter().all(|c| (1..=43).contains(&number(c))));
     let names: std::collections::HashSet<_> = checks.iter().map(|c| c.name).collect();
     assert_eq!(names.len(), checks.len());
 }

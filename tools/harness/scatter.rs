@@ -81,10 +81,10 @@ pub(super) fn scene(case: Case, size: Size) -> Job {
     job
 }
 
-/// The same world with no displacement fields.
+/// The same world where nothing deforms or flows.
 fn stiff(mut job: Job) -> Job {
     let mut instances: Vec<layout::Instance> = job.get("instances");
-    instances.iter_mut().for_each(|i| i.field = layout::NONE);
+    instances.iter_mut().for_each(|i| (i.field, i.flow) = (layout::NONE, 0));
     let at = job.index("instances");
     job.inputs[at] = Input::words("instances", &instances);
     job

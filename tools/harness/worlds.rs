@@ -9,7 +9,7 @@ use crate::reference::Owned;
 use insonify::scene::smoothed::smoothed;
 use insonify::scene::{Mesh, shapes};
 use insonify::sim::bvh::{BvhInstance, MeshBvh, SceneBvh};
-use insonify::sim::fields::{HEADER, padded};
+use insonify::sim::fields::{GENERATION, HEADER, padded};
 use insonify::sim::layout::{Frame, Instance, NONE, Surface, Tissue};
 use insonify::sim::lobe::Lobes;
 use insonify::sim::placement;
@@ -84,6 +84,31 @@ impl Builder {
                     let wave = DVec3::new((p.y / 7.0).sin(), (p.z / 9.0).cos(), (p.x / 8.0).sin());
                     let v = DVec3::new(0.05, -0.08, 0.04) * p + wave;
                     self.fields.push(v.as_vec3().to_array());
+                }
+            }
+        }
+    }
+
+    /// Lets something flow in the instance placed last: two generations, which a parabola about its axis z has carried by up to 3
+    /// mm forwards and by 2 mm backwards.
+    fn flow(&mut self) {
+        let (origin, spacing, size) = (DVec3::new(-6.0, -6.0, -30.0), 1.0, [13_u8, 13, 61]);
+        let header = [origin, DVec3::splat(f64::recip(spacing)), DVec3::from(size.map(f64::from))];
+        let header = header.map(|v| v.as_vec3().to_array());
+        let nodes = size.map(usize::from).iter().product::<usize>();
+        let next = 1 + header.len() + nodes;
+        self.instances.last_mut().expect("placed").flow = self.fields.len() as u32;
+        for (weight, number, way, next) in [(0.8, 7.0, 3.0, next as f32), (0.6, 8.0, -2.0, 0.0)] {
+            self.fields.push([weight, number, next]);
+            self.fields.extend(header);
+            let along = |n: u8| (0..n).map(f64::from);
+            for _ in along(size[2]) {
+                for j in along(size[1]) {
+                    for i in along(size[0]) {
+                        let [x, y] = [origin.x + spacing * i, origin.y + spacing * j];
+                        let share = f64::max(1.0 - (x * x + y * y) / 16.0, 0.0);
+                        self.fields.push([0.0, 0.0, (way * share) as f32]);
+                    }
                 }
             }
         }
@@ -231,6 +256,7 @@ pub fn world(case: Case) -> Builder {
             builder.place(shapes::sphere(5.0, 2), pose(2.0, 1.0, 27.0), 0, 2);
             builder.place(shapes::cuboid([9.0, 30.0, 6.0]), pose(-14.0, 0.0, 40.0), 3, 5);
             builder.place(shapes::cylinder(4.0, 50.3, 24), pose(12.0, 0.0, 33.0), 0, 1);
+            builder.flow();
             // A second placement of the same mesh, scaled and mirrored.
             let mirrored = DAffine3::from_scale(DVec3::new(-1.4, 0.8, 1.1));
             builder.again(2, pose(16.0, 2.0, 47.0) * mirrored, 3, 2);
@@ -294,12 +320,17 @@ pub fn size(job: &Job, name: &str) -> usize {
         }
         "fields" => {
             let fields = fields(job);
-            let used = instances.iter().filter(|i| i.field != NONE).map(|i| {
-                let header = i.field as usize + HEADER as usize;
+            let end = |at: u32| {
+                let header = at as usize + HEADER as usize;
                 let nodes = fields.get(header - 1).map_or(0.0, |n| n[0] * n[1] * n[2]);
                 header + nodes as usize
+            };
+            let deformed = instances.iter().filter(|i| i.field != NONE).map(|i| end(i.field));
+            let flows = instances.iter().filter(|i| i.flow != 0).map(|i| {
+                let next = fields.get(i.flow as usize).map_or(0.0, |head| head[2]);
+                end(i.flow + next as u32 + GENERATION)
             });
-            16 * used.max().unwrap_or(0)
+            16 * deformed.chain(flows).max().unwrap_or(0)
         }
         _ => 0,
     }

@@ -12,6 +12,34 @@ pub struct Field<'a> {
     displacements: &'a [[f32; 3]],
 }
 
+/// One generation of scatterers of what flows.
+#[derive(Clone, Copy, Debug)]
+pub struct Flowed<'a> {
+    /// Factor on their amplitudes.
+    pub weight: f64,
+    /// Its number.
+    pub generation: u32,
+    /// How far the flow has carried them.
+    pub field: Field<'a>,
+}
+
+impl<'a> Flowed<'a> {
+    /// The generations of which the first begins at vector `at` of `fields`: each a vector with weight, number and the
+    /// distance to the next one, and its field.
+    pub fn all(fields: &'a [[f32; 3]], mut at: u32) -> Vec<Self> {
+        let mut all = Vec::new();
+        loop {
+            let [weight, number, next] = fields[at as usize];
+            let field = Field::new(fields, at + 1);
+            all.push(Self { weight: weight.into(), generation: number as u32, field });
+            if next == 0.0 {
+                return all;
+            }
+            at += next as u32;
+        }
+    }
+}
+
 fn widen(v: [f32; 3]) -> DVec3 {
     DVec3::from(v.map(f64::from))
 }

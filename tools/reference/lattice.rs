@@ -51,6 +51,13 @@ impl Level {
         }
     }
 
+    /// The same level with the scatterers of a generation of what flows; number 0 has those of what does not.
+    pub fn of_generation(self, number: u32) -> Self {
+        // 2^32 over the golden ratio: lattices of successive numbers lie far from each other.
+        let shift = number.wrapping_mul(0x9e37_79b9);
+        Self { key: self.key.map(|key| key.wrapping_add(shift)), ..self }
+    }
+
     /// The scatterer in `cell`, if there is one.
     pub fn scatterer(&self, cell: I64Vec3) -> Option<Scatterer> {
         let at = [cell.x, cell.y, cell.z];

@@ -4,10 +4,10 @@
 mod lattices;
 mod others;
 
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DMat3, DVec3};
 
 use super::aperture::{counted, level, loses_by_aperture, lost_of, nepers};
-use super::field::Field;
+use super::field::{Field, Flowed};
 use super::geometry::{beam_weight, line_pitch, probe, world_line};
 use super::world::World;
 use super::{Accumulator, Segment};
@@ -37,23 +37,57 @@ pub(super) struct Tube<'a> {
     field: Option<Deformed<'a>>,
 }
 
-/// A field and its bounds.
+/// How tissue comes from where it rests to where it is now: blood is carried by its flow, then with what it is in.
 #[derive(Clone, Copy)]
 pub(super) struct Deformed<'a> {
-    field: Field<'a>,
-    /// mm.
+    fields: [Option<Field<'a>>; 2],
+    /// Bound on the displacement, mm.
     reach: f64,
+    /// Bound on its change per mm.
     steepness: f64,
+    /// Factor on amplitudes, and number of the generation.
+    weight: f64,
+    generation: u32,
 }
 
-impl Deformed<'_> {
+impl<'a> Deformed<'a> {
+    fn new(fields: [Option<Field<'a>>; 2], weight: f64, generation: u32) -> Self {
+        let all = || fields.iter().flatten();
+        Self {
+            fields,
+            reach: all().map(Field::reach).sum(),
+            steepness: all().map(|field| 1.0 + field.steepness()).product::<f64>() - 1.0,
+            weight,
+            generation,
+        }
+    }
+
+    /// Where the tissue that rests at `p` is now.
+    fn moved(&self, p: DVec3) -> DVec3 {
+        self.fields.iter().flatten().fold(p, |p, field| p + field.displacement(p))
+    }
+
+    /// Where the tissue that is at `p` now rests.
+    fn reference(&self, p: DVec3) -> DVec3 {
+        self.fields.iter().rev().flatten().fold(p, |p, field| field.reference(p))
+    }
+
+    /// The derivative of [`Self::moved`].
+    fn jacobian(&self, p: DVec3) -> DMat3 {
+        let all = self.fields.iter().flatten();
+        let (_, jacobian) = all.fold((p, DMat3::IDENTITY), |(p, before), field| {
+            (p + field.displacement(p), field.jacobian(p) * before)
+        });
+        jacobian
+    }
+
     /// Centre and radius of a ball that holds all points of the reference shape whose tissue can be within
     /// `radius` of `p`, relative to `p`: v differs by no more than `steepness` times the
     /// distance there, which is no more than radius / (1 - steepness).
     fn back(&self, p: DVec3, radius: f64) -> (DVec3, f64) {
         if self.steepness < 1.0 {
             let spread = self.steepness / (1.0 - self.steepness) * radius;
-            (self.field.reference(p) - p, spread)
+            (self.reference(p) - p, spread)
         } else {
             (DVec3::ZERO, self.reach)
         }
@@ -77,20 +111,28 @@ pub(super) fn is_finite(s: &Segment) -> bool {
 /// Echoes of the scatterers along all segments, in units of 1 / volume_scale.
 pub fn scatter(world: &World, segments: &[Segment]) -> Accumulator {
     let mut out = Accumulator::new(world.frame);
-    let deformed = |instance: u32| {
-        world.field(instance).map(|field| Deformed {
-            field,
-            reach: field.reach(),
-            steepness: field.steepness(),
-        })
+    // Of each instance as many as it has generations of scatterers; none where it is rigid.
+    let deformed = |instance: u32| -> Vec<Deformed<'_>> {
+        let field = world.field(instance);
+        let flows = world.flows(instance);
+        match (flows.is_empty(), field) {
+            (false, field) => flows
+                .into_iter()
+                .map(|Flowed { weight, generation, field: flow }| {
+                    Deformed::new([Some(flow), field], weight, generation)
+                })
+                .collect(),
+            (true, Some(field)) => vec![Deformed::new([None, Some(field)], 1.0, 0)],
+            (true, None) => Vec::new(),
+        }
     };
-    let fields: Vec<_> = (0..world.instances.len() as u32).map(deformed).collect();
+    let fields: Vec<Vec<Deformed<'_>>> = (0..world.instances.len() as u32).map(deformed).collect();
     let slots = world.frame.samples.div_ceil(SCATTER_SLOT) as usize;
     let mut loudest = vec![vec![f64::NEG_INFINITY; slots]; world.frame.scanlines as usize];
     for tube in segments
         .iter()
         .filter(|s| is_finite(s))
-        .map(|s| Tube::textured(world, s, &fields))
+        .map(|s| Tube::new(world, s, world.texture(s.instance), None))
         .filter(Tube::sounds)
     {
         for slot in tube.filled(&out) {
@@ -100,13 +142,23 @@ pub fn scatter(world: &World, segments: &[Segment]) -> Accumulator {
         }
     }
     for segment in segments.iter().filter(|s| is_finite(s)) {
-        let tube = Tube::textured(world, segment, &fields);
-        if tube.sounds() {
-            if world.frame.flags & FLAG_VOXEL == 0 {
-                tube.lattices(&loudest[tube.scanline as usize], &mut out);
-            } else {
-                tube.voxels(&mut out);
-            }
+        let all = fields.get(segment.instance as usize).map_or(&[][..], Vec::as_slice);
+        let space = world.texture(segment.instance);
+        let tube = Tube::new(world, segment, space, all.first().copied());
+        if !tube.sounds() {
+            continue;
+        }
+        if world.frame.flags & FLAG_VOXEL != 0 {
+            // Voxels are carried by no flow.
+            let still = world.field(segment.instance);
+            let still = still.map(|field| Deformed::new([None, Some(field)], 1.0, 0));
+            Tube { field: still, ..tube }.voxels(&mut out);
+            continue;
+        }
+        let loudest = &loudest[tube.scanline as usize];
+        tube.lattices(loudest, &mut out);
+        for later in all.iter().skip(1) {
+            Tube::new(world, segment, space, Some(*later)).lattices(loudest, &mut out);
         }
     }
     out
@@ -148,12 +200,6 @@ impl<'a> Tube<'a> {
             ],
             field,
         }
-    }
-
-    /// The segment in the space where its scatterers rest.
-    fn textured(world: &'a World, segment: &'a Segment, fields: &[Option<Deformed<'a>>]) -> Self {
-        let field = fields.get(segment.instance as usize).copied().flatten();
-        Self::new(world, segment, world.texture(segment.instance), field)
     }
 
     pub(super) fn sounds(&self) -> bool {

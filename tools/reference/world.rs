@@ -2,7 +2,7 @@
 
 use glam::{DAffine3, DMat3, DVec3};
 
-use super::field::Field;
+use super::field::{Field, Flowed};
 use super::stack::Stack;
 use insonify::scene::triangle;
 use insonify::sim::layout::{Aperture, Frame, Instance, NONE, Row, Rows, Surface, Tissue};
@@ -246,6 +246,13 @@ impl World<'_> {
         }
         let at = self.instances[instance as usize].field;
         (at != NONE).then(|| Field::new(self.fields, at))
+    }
+
+    /// The generations of scatterers of what flows in `instance`; none where nothing does.
+    pub fn flows(&self, instance: u32) -> Vec<Flowed<'_>> {
+        let world = self.frame.flags & insonify::sim::layout::FLAG_WORLD_TEXTURE != 0;
+        let at = if instance == NONE || world { 0 } else { self.instances[instance as usize].flow };
+        if at == 0 { Vec::new() } else { Flowed::all(self.fields, at) }
     }
 
     /// The place in the reference shape, in texture space, of the tissue that is at `p` in the world.

@@ -8,9 +8,11 @@ use super::{Orientation, Origins, Scene, Tissue, Warning};
 
 mod again;
 mod anatomy;
+mod columns;
 mod contact;
 mod document;
 mod error;
+mod flow;
 mod fusion;
 mod graph;
 mod known;
@@ -170,10 +172,12 @@ impl Scene {
             contact,
             tracker,
             live,
+            flows: Vec::new(),
             origins,
         };
         scene.place_model(placing::placement(&file.model.stated, ""));
         anatomy::countable(&document, &scene.wires)?;
+        scene.flows = flow::build(&document, &file.flow, &scene)?;
         scene.set_time(0.0);
         scene.tasks =
             tasks::build(&document, &file.task, &scene.poses, &scene.meshes, &scene.instances)?;

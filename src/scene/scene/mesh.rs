@@ -9,6 +9,7 @@ use crate::issue::Issue;
 mod animated;
 mod keyframes;
 mod recipe;
+mod section;
 mod soup;
 mod surface;
 

@@ -40,12 +40,13 @@ impl Scene {
     /// volume. Any time, in any order. Without animation the scene stays as it is.
     pub fn set_time(&mut self, seconds: f64) {
         self.graph.evaluate(seconds, &mut self.instances);
+        self.flows.iter_mut().for_each(|flow| flow.seconds = seconds);
         if let Some(acquired) = &mut self.volume {
             acquired.set_time(seconds);
         }
     }
 
-    /// Returns whether anything follows time: the anatomy, or the acquired volume.
+    /// Returns whether anything follows time: the anatomy, blood that flows, or the acquired volume.
     pub fn is_animated(&self) -> bool {
         let moves = |node: &Node| match &node.kind {
             NodeKind::Transform { motion, .. } => *motion != Motion::Still,
@@ -53,7 +54,8 @@ impl Scene {
             NodeKind::Group | NodeKind::Mesh { .. } => false,
         };
         let changes = |acquired: &Acquired| acquired.sequence.is_some();
-        self.graph.nodes.iter().any(moves) || self.volume.as_ref().is_some_and(changes)
+        let changing = self.volume.as_ref().is_some_and(changes);
+        self.graph.nodes.iter().any(moves) || changing || !self.flows.is_empty()
     }
 
     /// Clock of what beats: of the first selector whose keyframes follow each other again and again, from the first one.

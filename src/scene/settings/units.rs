@@ -48,6 +48,9 @@ measures! {
     /// mm/us.
     SPEED: "speed", "a speed of sound", true, "",
         [("mm/us", 1.0), ("m/s", 1e-3), ("km/s", 1.0)];
+    /// mm/s.
+    VELOCITY: "velocity", "a velocity", true, "of blood and tissue",
+        [("mm/s", 1.0), ("cm/s", 10.0), ("m/s", 1000.0)];
     /// g/cm3.
     DENSITY: "density", "a density", true, "",
         [("g/cm3", 1.0), ("kg/m3", 1e-3), ("g/cm^3", 1.0), ("kg/m^3", 1e-3)];

@@ -34,6 +34,22 @@ impl Grid {
         Self { origin: (low + high - cells * spacing) / 2.0, spacing, size: cells.as_uvec3() + 1 }
     }
 
+    /// The grid around `points` with one cell to spare on each side, of this spacing, or of as many nodes as `most`.
+    pub fn spaced(points: impl Iterator<Item = DVec3>, spacing: f64, most: usize) -> Self {
+        let (low, high) = ends(points);
+        let extent = high - low;
+        let mut spacing = spacing.max(1e-3);
+        loop {
+            let cells = (extent / spacing - 1e-9).ceil().max(DVec3::ONE) + 2.0;
+            // Compared as floats: a count of nodes may be beyond every integer.
+            if (cells + 1.0).element_product() <= most as f64 {
+                let origin = (low + high - cells * spacing) / 2.0;
+                return Self { origin, spacing, size: cells.as_uvec3() + 1 };
+            }
+            spacing *= 1.1;
+        }
+    }
+
     /// One cell, a cube, around `points`: enough for an affine map.
     pub fn one_cell(points: impl Iterator<Item = DVec3>) -> Self {
         let (low, high) = ends(points);

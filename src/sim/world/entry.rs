@@ -180,9 +180,11 @@ pub(super) fn rows(
                 low: corner(own.bounds[0]),
                 high: corner(own.bounds[1]),
                 field: fields.offset(scene, i),
+                flow: fields.flow(scene, i),
                 masks: u32::from(scene.is_mask(i)),
                 owners: place.owners,
                 finest: (places[placed.mesh].finest * stretch(&placed.world_from_object)) as f32,
+                ..layout::Instance::default()
             }
         })
         .collect();

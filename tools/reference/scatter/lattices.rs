@@ -63,7 +63,9 @@ impl Tube<'_> {
     /// Echoes of all lattices in use somewhere along the tube.
     pub(super) fn lattices(&self, loudest: &Loudest, out: &mut Accumulator) {
         for number in 0..=LATTICE_LEVELS {
-            let level = Level::new(self.tissue, self.world.frame.cell, number);
+            let generation = self.field.map_or(0, |field| field.generation);
+            let level =
+                Level::new(self.tissue, self.world.frame.cell, number).of_generation(generation);
             match self.field {
                 None => self.planes(number, &level, loudest, out),
                 Some(field) => self.pieces(field, number, &level, loudest, out),
@@ -190,10 +192,10 @@ impl Tube<'_> {
                 let half = [1.1 * rows[0].max(rows[1]), 1.1 * reach];
                 let radius = DVec3::new((x1 - x0) / 2.0, half[0], half[1]).length();
                 let (back, spread) = deformed.back(middle, radius);
-                let reference = deformed.field.reference(middle);
+                let reference = deformed.reference(middle);
                 // Squeezed tissue keeps its echo level though its scatterers are closer together.
                 let least = f64::from(LEAST_GROWTH);
-                let jacobian = deformed.field.jacobian(reference);
+                let jacobian = deformed.jacobian(reference);
                 let growth = jacobian.determinant().abs().clamp(least, least.recip());
                 let ahead = jacobian.inverse() * self.direction;
                 let (low, high) = self.bounds([x0, x1], half);
@@ -207,7 +209,7 @@ impl Tube<'_> {
                                 continue;
                             };
                             let rest = (cell.as_dvec3() + s.offset) * h;
-                            let from = rest + deformed.field.displacement(rest) - self.origin;
+                            let from = deformed.moved(rest) - self.origin;
                             let x = from.dot(self.direction);
                             if !(x0..x1).contains(&x) {
                                 continue;
@@ -222,7 +224,9 @@ impl Tube<'_> {
                             let power = self.power(number, x, bin, loudest, out);
                             let on_axis = reference + (x - x0.midpoint(x1)) * ahead;
                             let texture = factor(self.tissue, on_axis);
-                            let strength = self.weight(x, row) * (power * growth).sqrt() * texture;
+                            let strength =
+                                deformed.weight * self.weight(x, row) * (power * growth).sqrt();
+                            let strength = strength * texture;
                             let ratio = self.ratio(x);
                             let heard = self.heard(from, x, row, ratio, in_row(row));
                             if heard > 0.0 {

@@ -21,7 +21,7 @@ impl Tube<'_> {
         for k in (first..i64::from(frame.samples) + 1).take_while(|&k| (k as f64) < end) {
             let x = self.distance(k as f64);
             let p = self.origin + x * self.direction;
-            let p = self.field.map_or(p, |f| f.field.reference(p));
+            let p = self.field.map_or(p, |f| f.reference(p));
             let cell = (p / h).floor().as_i64vec3();
             let Some(s) = voxel(self.tissue, cell) else {
                 continue;

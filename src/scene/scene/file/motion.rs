@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::columns;
 use super::document::Document;
 use super::error::SceneError;
 use super::placing::{AXIS, PLACE, TURN};
@@ -185,7 +186,7 @@ pub(super) fn motion(
                 Between::Step => Curve::Step,
             };
             let at = format!("{path}.file");
-            let text = trajectory::text(&full).map_err(|e| {
+            let text = columns::text(&full).map_err(|e| {
                 document.fail(&at, e.to_string(), "check the path of the trajectory")
             })?;
             let track = trajectory::parse(&full, &text, curve)?;

@@ -9,6 +9,7 @@ use super::anatomy::WireKeys;
 use super::contact::ContactKeys;
 use super::document::{Document, quoted};
 use super::error::SceneError;
+use super::flow::{FlowKeys, LineKeys, WaveformKeys};
 use super::fusion::{MaskKeys, VolumeKeys};
 use super::graph::SelectorKeys;
 use super::motion::{Cycle, MotionKeys, Updates};
@@ -158,6 +159,8 @@ tables! {
         defaults::<Affine>(""), defaults::<MotionKeys>("motion."), defaults::<Cycle>("motion."), defaults::<Updates>("motion.");
     selector: Many<SelectorKeys>, "selector": defaults::<NodeKeys>(""), defaults::<SelectorKeys>(""), defaults::<Cycle>(""),
         defaults::<Updates>(""), defaults::<Following>("");
+    flow: Many<FlowKeys>, "flow": defaults::<FlowKeys>(""), defaults::<LineKeys>("line."),
+        defaults::<WaveformKeys>("waveform.");
     wire: Many<WireKeys>, "wire": defaults::<WireKeys>("");
     tissues: Named<Tissue>, "tissues.NAME": defaults::<TissueKeys>(""), keys::<Tissue>("", "");
     simulation: One<Simulation>, "simulation": defaults::<Simulation>("");

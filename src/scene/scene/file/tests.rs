@@ -1,3 +1,4 @@
+mod flow;
 pub(super) mod graph;
 mod mistakes;
 mod vary;

@@ -10,7 +10,8 @@ use toml_edit::Key;
 use crate::settings::suggest;
 
 /// Tables of which a file may have several.
-pub const LISTS: [&str; 7] = ["pose", "task", "group", "transform", "selector", "mesh", "wire"];
+pub const LISTS: [&str; 8] =
+    ["pose", "task", "group", "transform", "selector", "mesh", "flow", "wire"];
 
 /// The value at a path of keys and indices.
 pub fn find<'a, 's>(root: &'a DeTable<'s>, path: &[&str]) -> Option<&'a Spanned<DeValue<'s>>> {

@@ -268,7 +268,7 @@ fn mistakes_of_trajectories_are_placed_in_their_file() {
     toml(
         &format!("{t}z_mm = [0]\ntime_s = [0, 1]\n"),
         (3, 9),
-        "1 values of z_mm for 2 times",
+        "1 values of z_mm, and 2 of time_s",
         "as many",
     );
     toml(

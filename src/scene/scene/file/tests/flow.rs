@@ -1,0 +1,135 @@
+//! The tables `flow`, and every mistake in them.
+
+use glam::{DAffine3, DVec3};
+
+use super::Case;
+use super::graph::write;
+use crate::scene::flow::{Course, FlowShape};
+
+/// A scene with a vessel along z: 4 mm wide in the middle part, of 60 mm.
+fn vessel(flow: &str) -> String {
+    format!(
+        "background = \"fat\"\n[[mesh]]\nname = \"vessel\"\nshape = {{ cylinder = {{ radius = 4, length = 60 }} }}\n\
+         tissue = \"blood\"\ntranslate = [0, 0, 40]\n{flow}"
+    )
+}
+
+fn flow(more: &str) -> String {
+    vessel(&format!("[[flow]]\nname = \"f\"\nmesh = \"vessel\"\nspeed = \"30 cm/s\"\n{more}"))
+}
+
+const STRAIGHT: &str = "line = { from = [0, 0, -30], to = [0, 0, 30] }\n";
+
+#[test]
+fn a_straight_vessel_has_the_radius_of_its_cross_sections() {
+    let case = Case::new();
+    let (scene, _) = case.load(&flow(STRAIGHT), &[]).expect("a flow");
+    let flow = &scene.flows[0];
+    let FlowShape::Tube { line, exponent } = &flow.shape else { panic!("a tube") };
+    assert_eq!((*exponent, flow.speed, flow.course.clone()), (2.0, 300.0, Course::Steady));
+    // A polygon as large as the circle would be a little wider.
+    assert!(line.radii().all(|r| (r - 4.0).abs() < 0.02), "{line:?}");
+    let v = flow.velocity(DVec3::X * 2.0, &DAffine3::IDENTITY, 0.0);
+    assert!(v.abs_diff_eq(DVec3::Z * 225.0, 1.5), "{v}");
+    assert!(scene.is_animated());
+}
+
+#[test]
+fn files_give_centre_lines_and_waveforms() {
+    let case = Case::new();
+    write(&case, "line.csv", "x_mm,y_mm,z_mm,radius_mm\n0,0,-30,4\n0,0.5,0,2\n0,0,30,4\n");
+    write(&case, "pulse.csv", "time_s,speed\n0,20\n0.1,-80\n0.8,20\n");
+    let text =
+        flow("line = { file = \"line.csv\" }\nwaveform = { file = \"pulse.csv\", phase = 0.25 }\n");
+    let (mut scene, _) = case.load(&text, &[]).expect("a flow");
+    let FlowShape::Tube { line, .. } = &scene.flows[0].shape else { panic!("a tube") };
+    assert_eq!(line.radii().collect::<Vec<_>>(), [4.0, 2.0, 4.0]);
+    // A quarter of a period before its height.
+    let height = 0.1 - 0.25 * 0.8;
+    assert!((scene.flows[0].course.at(height) + 1.0).abs() < 1e-12);
+    // Four times as fast where it is half as wide.
+    let v = scene.flows[0].velocity(DVec3::Y * 0.5, &DAffine3::IDENTITY, height);
+    assert!((v.length() - 1200.0).abs() < 1e-6, "{v}");
+    scene.set_time(3.0);
+    let text = flow(
+        "kind = \"uniform\"\ndirection = [0, 2, 0]\nwaveform = { file = \"pulse.csv\", period = \"2 s\" }\n",
+    );
+    let (scene, _) = case.load(&text, &[]).expect("a flow");
+    let v = scene.flows[0].velocity(DVec3::ZERO, &DAffine3::IDENTITY, 0.25);
+    assert!(v.abs_diff_eq(DVec3::Y * -300.0, 1e-9), "{v}");
+}
+
+#[test]
+fn mistakes_of_flows_are_placed() {
+    let case = Case::new();
+    // Line of the first key of the table, less 1.
+    let table = vessel("").lines().count() + 1;
+    let f = |text: &str, (line, column): (usize, usize), cause: &str, remedy: &str| {
+        case.fails(text, (table + line, column), cause, remedy);
+    };
+    f(
+        &flow(STRAIGHT).replace("mesh = \"vessel\"", "mesh = \"vesel\""),
+        (2, 8),
+        "no mesh `vesel`",
+        "`vessel`",
+    );
+    f(&flow(""), (2, 8), "needs its centre line", "from");
+    f(&flow("line = { from = [0, 0, 0] }\n"), (2, 8), "needs its centre line", "to =");
+    f(&flow(STRAIGHT).replace("30 cm/s", "30 MHz"), (3, 9), "`MHz` does not fit", "");
+    f(&flow(STRAIGHT).replace("30 cm/s", "90 m/s"), (3, 9), "speed is", "between");
+    f(&flow("kind = \"uniform\"\n"), (4, 8), "needs its direction", "direction = [x, y, z]");
+    f(&flow("direction = [1, 0, 0]\n"), (4, 13), "kind `uniform`", "kind = \"uniform\"");
+    f(
+        &flow("line = { from = [0, 0, 100], to = [0, 0, 200] }\n"),
+        (4, 17),
+        "outside `vessel`",
+        "own space",
+    );
+    f(
+        &flow("line = { from = [0, 0, -9], to = [0, 0, 9], file = \"line.csv\" }\n"),
+        (4, 52),
+        "either a file",
+        "remove",
+    );
+    f(&flow("line = { file = \"none.csv\" }\n"), (4, 17), "none.csv", "check the path");
+    f(
+        &flow(&format!("{STRAIGHT}waveform = {{ period = \"1 s\" }}\n")),
+        (5, 12),
+        "has no file",
+        "steady",
+    );
+    let two = flow(STRAIGHT);
+    let second = two[two.find("[[flow]]").expect("a flow")..].replace("\"f\"", "\"g\"");
+    f(&format!("{two}{second}"), (7, 8), "`f` flows in `vessel` already", "another mesh");
+}
+
+#[test]
+fn mistakes_in_files_of_flows_are_placed() {
+    let case = Case::new();
+    let line = flow("line = { file = \"line.csv\" }\n");
+    let wave = flow(&format!("{STRAIGHT}waveform = {{ file = \"pulse.csv\" }}\n"));
+    for (text, name, content, place, cause) in [
+        (&line, "line.csv", "x_mm,y_mm\n0,0\n1,1\n", 1, "column `z_mm` is missing"),
+        (&line, "line.csv", "x,y,z\n0,0,0\n", 1, "unknown column `x`"),
+        (&line, "line.csv", "x_mm,y_mm,z_mm\n0,0,0\n", 2, "at least two points"),
+        (&line, "line.csv", "x_mm,y_mm,z_mm\n0,0,0\n0,NaN,1\n", 3, "y_mm is not finite"),
+        (
+            &line,
+            "line.csv",
+            "x_mm,y_mm,z_mm,radius_mm\n0,0,0,1\n0,0,1,0\n",
+            3,
+            "the radius is 0 mm",
+        ),
+        (&wave, "pulse.csv", "time_s,speed\n0,1\n0,2\n", 3, "time 0 s follows 0 s"),
+        (&wave, "pulse.csv", "time_s,speed\n0,1\n1,NaN\n", 3, "speed is not finite"),
+        (&wave, "pulse.csv", "time_s,speed\n0,0\n1,0\n", 1, "a speed that is not zero"),
+        (&wave, "pulse.csv", "time,speed\n0,1\n", 1, "unknown column `time`"),
+        (&wave, "pulse.csv", "time_s,speed\n", 1, "no rows"),
+    ] {
+        write(&case, name, content);
+        let error = case.load(text, &[]).map(|_| ()).expect_err(cause);
+        let said = error.to_string();
+        assert!(error.file.ends_with(name) && error.line == place, "{said}");
+        assert!(said.contains(cause) && error.remedy.is_some(), "{said}, not {cause}");
+    }
+}
