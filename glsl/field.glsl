@@ -5,7 +5,7 @@
 
 #include "numbers.glsl"
 
-struct Field { vec3 origin; vec3 scale; vec3 last; uint values; };
+struct Field { vec3 origin; vec3 scale; vec3 last; uint values; float amount; };   // factor on its displacements
 
 // Offset of the field of an instance; NONE where its tissue does not deform.
 uint field_of(uint instance) {
@@ -13,8 +13,8 @@ uint field_of(uint instance) {
     return instances[instance].field;
 }
 
-// Offset of what flows in an instance, in vectors: of a generation of scatterers its weight, its number and the distance to the
-// next one's (0: it is the last), before its field. 0: nothing flows.
+// Offset of what flows in an instance, in vectors: of each generation of scatterers its weight, its number and how far it has
+// been carried, then the field of the flow's shape. 0: nothing flows.
 uint flow_of(uint instance) {
     if (instance == NONE || (frame.flags & FLAG_WORLD_TEXTURE) != 0u) return 0u;
     return instances[instance].flow;
@@ -32,6 +32,7 @@ Field load_field(uint at) {
     f.scale = field_vector(at + 1u);
     f.last = field_vector(at + 2u) - 1.0;
     f.values = at + 3u;
+    f.amount = 1.0;
     return f;
 }
 
@@ -53,11 +54,11 @@ vec3 displacement(Field f, vec3 p, out mat3 gradient) {
     vec3 near = near_low + t.y * (near_high - near_low), far = far_low + t.y * (far_high - far_low);
     vec3 along_low = (b - a) + t.y * ((d - c) - (b - a));
     vec3 along_high = (g - e) + t.y * ((i - h) - (g - e));
-    vec3 slope = f.scale * vec3(equal(at, on));
+    vec3 slope = f.amount * f.scale * vec3(equal(at, on));
     gradient[0] = slope.x * (along_low + t.z * (along_high - along_low));
     gradient[1] = slope.y * (near_high - near_low + t.z * ((far_high - far_low) - (near_high - near_low)));
     gradient[2] = slope.z * (far - near);
-    return near + t.z * (far - near);
+    return f.amount * (near + t.z * (far - near));
 }
 
 vec3 displaced(Field f, vec3 p) {
@@ -65,20 +66,25 @@ vec3 displaced(Field f, vec3 p) {
     return p + displacement(f, p, gradient);
 }
 
-// The fields by which tissue comes from where it rests to where it is now: blood is carried by its flow first, and then with
-// what it is in. NONE: none.
-struct Motion { uint flow; uint field; };
+// The fields by which tissue comes from where it rests to where it is now: blood is carried by its flow first, its shape times
+// a way, and then with what it is in. NONE: none.
+struct Motion { uint flow; float way; uint field; };
 
-uint motion_field(Motion m, uint i) { return i == 0u ? m.flow : m.field; }
+uint motion_offset(Motion m, uint i) { return i == 0u ? m.flow : m.field; }
+
+Field motion_field(Motion m, uint i) {
+    Field f = load_field(motion_offset(m, i));
+    f.amount = i == 0u ? m.way : 1.0;
+    return f;
+}
 
 // Where the tissue that rests at p is now, and the derivative of that by p.
 vec3 moved(Motion m, vec3 p, out mat3 jacobian) {
     jacobian = mat3(1.0);
     for (uint i = 0u; i < 2u; ++i) {
-        uint at = motion_field(m, i);
-        if (at == NONE) continue;
+        if (motion_offset(m, i) == NONE) continue;
         mat3 gradient;
-        p += displacement(load_field(at), p, gradient);
+        p += displacement(motion_field(m, i), p, gradient);
         jacobian += gradient * jacobian;
     }
     return p;
@@ -107,8 +113,7 @@ vec3 reference_point(Field f, vec3 p) {
 // Where the tissue that is at p now rests.
 vec3 rest_of(Motion m, vec3 p) {
     for (uint i = 0u; i < 2u; ++i) {
-        uint at = motion_field(m, 1u - i);
-        if (at != NONE) p = reference_point(load_field(at), p);
+        if (motion_offset(m, 1u - i) != NONE) p = reference_point(motion_field(m, 1u - i), p);
     }
     return p;
 }

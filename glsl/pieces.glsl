@@ -5,7 +5,6 @@
 // at the beam's edge may be missed.
 const float MOST_SQUEEZED = 2.5;
 
-const uint GENERATIONS = 2u;
 const uint GENERATION_KEY = 0x9e3779b9u;   // 2^32 over the golden ratio: lattices of successive numbers lie far from each other
 
 vec3 bounded(vec3 v) { return v * min(1.0, MOST_SQUEEZED * inversesqrt(max(dot(v, v), 1e-12))); }
@@ -138,19 +137,21 @@ uvec3 march_piece(Stretch s, Scatterers group, int number, vec2 x, float drowned
     return count;
 }
 
-// Scatterers of the lattices from one number to another, of both generations where something flows.
+// Scatterers of the lattices from one number to another: of both generations where something flows, and of one for a pulse.
 uvec3 march_generations(Stretch s, ivec2 numbers, vec2 x, float drowned) {
     uvec3 count = uvec3(0u);
-    uint at = flow_of(s.instance);
-    Scatterers group = Scatterers(Motion(NONE, field_of(s.instance)), 1.0, 0u);
-    for (uint i = 0u; i < GENERATIONS; ++i) {
-        if (at != 0u) {
-            vec3 head = field_vector(at);
-            group = Scatterers(Motion(at + 1u, group.motion.field), head.x, uint(whole(head.y)));
-            at = head.z > 0.0 ? at + uint(whole(head.z)) : 0u;
+    uint flow = flow_of(s.instance);
+    bool pulse = (push.part & PART_PULSE) != 0u;
+    Scatterers group = Scatterers(Motion(NONE, 0.0, field_of(s.instance)), 1.0, 0u);
+    for (uint i = 0u; i < (flow == 0u || pulse ? 1u : GENERATIONS); ++i) {
+        if (flow != 0u) {
+            vec3 head = field_vector(flow + (pulse ? GENERATIONS : i));
+            group.motion.flow = flow + FLOW_VECTORS;
+            group.motion.way = head.z + (pulse ? head.x * push.time : 0.0);
+            group.weight = pulse ? 1.0 : head.x;
+            group.number = uint(whole(head.y));
         }
         for (int number = numbers.x; number <= numbers.y; ++number) count += march_piece(s, group, number, x, drowned);
-        if (at == 0u) break;
     }
     return count;
 }

@@ -7,7 +7,7 @@ uvec3 march_sample(Stretch s, int k) {
     if (!(x >= 0.0 && x < s.extent)) return uvec3(0u);
     vec3 p = s.o + x * s.d;
     // Voxels are carried by no flow.
-    if (deforms(s)) p = rest_of(Motion(NONE, field_of(s.instance)), p);
+    if (deforms(s)) p = rest_of(Motion(NONE, 0.0, field_of(s.instance)), p);
     ivec3 cell = ivec3(floor(p / frame.cell));
     uint seed = tissues[s.tissue].seed;
     uvec4 bits = pcg4d(uvec4(uvec3(cell), seed));

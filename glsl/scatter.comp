@@ -24,6 +24,10 @@ layout(std430, binding = 9) restrict readonly buffer ScanlineBuffer { Scanline s
 layout(std430, binding = 10) restrict readonly buffer FieldBuffer { vec4 fields[]; };   // of the deforming one
 layout(std430, binding = 11) restrict buffer PointEchoBuffer { int point_echoes[]; };   // where there are point targets
 layout(std430, binding = 12) restrict readonly buffer ApertureBuffer { Aperture apertures[]; };
+layout(push_constant) uniform Push {
+    uint part;     // PART_*
+    float time;    // of a pulse, seconds from the frame's time
+} push;
 
 // True if any instance's tissue deforms. Two modules, as not every driver removes the code that a specialization
 // constant switches off, and the code for deformed tissue is the larger half.
@@ -73,6 +77,12 @@ Stretch texture_stretch(uint at) {
 }
 
 bool deforms(Stretch s) { return DEFORMING && (field_of(s.instance) != NONE || flow_of(s.instance) != 0u); }
+
+// True if the dispatch hears the stretch.
+bool heard(Stretch s) {
+    bool flows = DEFORMING && flow_of(s.instance) != 0u;
+    return sounds(s) && (push.part & (flows ? PART_FLOWING : PART_STILL)) != 0u;
+}
 
 // Parts of a bin that are searched one by one: in deformed tissue, several.
 uint items_of(Stretch s) { return deforms(s) ? SCATTER_BIN / frame.piece : 1u; }
@@ -380,7 +390,7 @@ void main() {
             uint at = stretch_at(scanline, gl_WorkGroupID.y + (batch + thread) * chunks);
             Stretch s = world_stretch(at);
             work_at[thread] = at;
-            work_end[thread] = sounds(s) ? uint(max(work_of(s, voxel).y, 0)) : 0u;
+            work_end[thread] = heard(s) ? uint(max(work_of(s, voxel).y, 0)) : 0u;
         }
         barrier();
         if (thread == 0u) {
@@ -400,7 +410,7 @@ void main() {
                 count += march_bin(s, index / items, index % items);
             }
         }
-        for (uint i = 0u; i < size && frame.points > 0u; ++i) {
+        for (uint i = 0u; i < size && frame.points > 0u && (push.part & PART_STILL) != 0u; ++i) {
             Stretch w = world_stretch(work_at[i]);
             uint groups = is_finite(w) ? (frame.points + POINT_GROUP - 1u) / POINT_GROUP : 0u;
             for (uint g = thread; g < groups; g += THREADS) {

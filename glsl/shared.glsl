@@ -100,6 +100,12 @@ const uint SCATTER_BIN = 64u;       // samples of a stretch for which one thread
 const uint SCATTER_SLOT = 16u;      // samples over which the levels of stretches are compared
 const float LEAST_GROWTH = 0.05;    // smallest relative volume of squeezed tissue, largest is its inverse; a coarse field may exceed both
 const float SAMPLE_BLEND = 0.0625;  // fraction of a sample, halfway between two, in which both get a share of a scatterer
+const uint GENERATIONS = 2u;        // of scatterers of what flows that are heard together
+const uint FLOW_VECTORS = 3u;       // before the field of what flows: one for each generation, and one for pulses
+// What a dispatch of scatter hears, bit by bit.
+const uint PART_STILL = 1u;         // what does not flow
+const uint PART_FLOWING = 2u;       // what flows
+const uint PART_PULSE = 4u;         // as one pulse of a packet hears it: what flows is one generation, carried on to its time
 const uint POINT_GROUP = 8u;        // point targets that share a bounding sphere
 const float UNHEARD = 3.3219281;    // log2(10): what is more than 20 dB below black is not summed
 

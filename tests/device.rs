@@ -27,6 +27,7 @@ mod labels;
 mod lattice;
 mod line;
 mod live;
+mod packet;
 mod physics;
 mod probe;
 mod series;

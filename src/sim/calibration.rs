@@ -111,12 +111,15 @@ impl<'a> Calibration<'a> {
         self.compensation_db(z) + sliders[i] * (1.0 - f) + sliders[i + 1] * f
     }
 
+    /// Level of the noise in the samples of an image, dB; that of the echo of a perfect mirror is 0.
+    pub fn noise_level(&self) -> f64 {
+        self.scene.imaging.noise - self.scene.imaging.power
+    }
+
     /// Standard deviation of each component of the noise per sample, such that the axial kernel
     /// brings its RMS magnitude to the wanted level, in units of the echo of a perfect mirror.
     pub fn noise(&self) -> f64 {
-        let imaging = &self.scene.imaging;
-        amplitude(imaging.noise - imaging.power)
-            / (2.0 * autocorrelation(&self.axial_taps, 0)).sqrt()
+        amplitude(self.noise_level()) / (2.0 * autocorrelation(&self.axial_taps, 0)).sqrt()
     }
 
     /// Factor on what is received, TGC applied, after which 1 is white.

@@ -3,6 +3,7 @@
 use super::layout::{self, ROLE_BRANCHES};
 use super::pass::Extent;
 use super::passes::{Instead, Passes};
+use super::push;
 use super::stages::{APERTURE, EXPECT, ORIGIN, SCATTER, TRACE, aperture, scatter, trace};
 use crate::gpu::{Commands, GpuError, Stage};
 
@@ -11,16 +12,19 @@ impl Passes {
         self.frame().flags & layout::FLAG_APERTURE != 0
     }
 
-    /// Records the echoes of all paths, batch after batch, and for labels of levels what is expected of them.
-    pub(super) fn echoes(&self, cmd: &mut Commands, levelled: bool) -> Result<(), GpuError> {
+    /// Records the echoes of all paths, batch after batch, of scatterers those that `push` names, and for labels of levels what
+    /// is expected of them.
+    pub(super) fn echoes(
+        &self,
+        cmd: &mut Commands,
+        push: push::Scatter,
+        levelled: bool,
+    ) -> Result<(), GpuError> {
         self.run(cmd, &ORIGIN)?;
         let mut turn = 0;
         for begin in (0..self.frame().paths).step_by(self.batches.paths as usize) {
             self.trace(cmd, begin, &mut turn)?;
-            cmd.scope(SCATTER.name);
-            let [threads, ..] = self.kernels.of(&SCATTER, self.world.deforms()).local_size();
-            let groups = scatter::extent(self.frame(), self.batches.rounds.at_once / threads);
-            self.record(cmd, &SCATTER, groups, &[], &|_| Vec::new())?;
+            self.scatter(cmd, push)?;
             if levelled {
                 self.run(cmd, &EXPECT)?;
             }
@@ -29,6 +33,14 @@ impl Passes {
             true => self.direct_echoes(cmd),
             false => Ok(()),
         }
+    }
+
+    /// Records the echoes of the scatterers that `push` names along the segments of the last batch.
+    pub(super) fn scatter(&self, cmd: &mut Commands, push: push::Scatter) -> Result<(), GpuError> {
+        cmd.scope(SCATTER.name);
+        let [threads, ..] = self.kernels.of(&SCATTER, self.world.deforms()).local_size();
+        let groups = scatter::extent(self.frame(), self.batches.rounds.at_once / threads);
+        self.record(cmd, &SCATTER, groups, bytemuck::bytes_of(&push), &|_| Vec::new())
     }
 
     /// Records what the aperture lets through, of `apertures` or what is bound instead.

@@ -12,4 +12,14 @@ pub enum SimError {
     /// The geometry does not fit the tracer.
     #[error(transparent)]
     World(#[from] WorldError),
+    /// A packet is larger than what is kept of one.
+    #[error(
+        "a packet of {bytes} bytes is larger than {most}: take fewer pulses, scanlines or samples"
+    )]
+    Packet {
+        /// Size of the packet.
+        bytes: u64,
+        /// Largest size.
+        most: u64,
+    },
 }

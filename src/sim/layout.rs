@@ -88,6 +88,16 @@ constants! {
     pub const ALL_LEVELS: f32 = -1000.0;
     /// Samples that one workgroup of `scatter` gathers.
     pub const SCATTER_WINDOW: u32 = 1024;
+    /// Generations of scatterers of what flows that are heard together.
+    pub const GENERATIONS: u32 = 2;
+    /// Vectors before the field of what flows: one for each generation, and one for pulses.
+    pub const FLOW_VECTORS: u32 = 3;
+    /// Bit of a dispatch of `scatter`: it hears what does not flow.
+    pub const PART_STILL: u32 = 1;
+    /// Bit of a dispatch of `scatter`: it hears what flows.
+    pub const PART_FLOWING: u32 = 2;
+    /// Bit of a dispatch of `scatter`: it hears what flows as one pulse of a packet does, one generation carried on to its time.
+    pub const PART_PULSE: u32 = 4;
     /// Samples of a stretch for which one thread of `scatter` works.
     pub const SCATTER_BIN: u32 = 64;
     /// Smallest fraction of its volume to which tissue is taken to be squeezed; the largest is its inverse. A coarse

@@ -39,6 +39,7 @@ mod line;
 pub mod lobe;
 pub mod memory;
 mod outputs;
+mod packet;
 pub mod pass;
 mod pass_kernels;
 mod passes;
@@ -77,10 +78,11 @@ use bvh::Splits;
 pub use error::SimError;
 use lane::Lane;
 pub use lane::Shot;
-use line::OneLine;
+use line::LineRange;
 pub use memory::Memory;
 use outputs::Last;
 pub use outputs::Outputs;
+pub use packet::Packet;
 use pass_kernels::PassKernels;
 use passes::Passes;
 pub use resize::{beyond_some_devices, image_size};
@@ -239,7 +241,7 @@ impl Simulator {
         &mut self,
         scene: &Scene,
         shots: &[Shot],
-        line: Option<OneLine>,
+        line: Option<LineRange>,
         outputs: &Outputs<'_>,
     ) -> Result<Vec<FrameTimings>, SimError> {
         assert!(!shots.is_empty(), "a frame without images");
@@ -256,7 +258,7 @@ impl Simulator {
         let sizes = passes.batches.sizes(passes.frame(), &self.tables);
         passes.clear(&mut cmd, &sizes);
         // 3. Sums of echoes: complex, fixed point, what the way has weakened still to be taken off.
-        passes.echoes(&mut cmd, levelled)?;
+        passes.echoes(&mut cmd, push::Scatter::IMAGE, levelled)?;
         // 4. Lateral-smoothed complex baseband, with noise: level.
         passes.run(&mut cmd, &BEAM)?;
         // 5. IQ: level; log image: 0 black to 1 white.

@@ -1,7 +1,9 @@
-//! One scanline at a time: what M-mode shows, many times a second.
+//! Some scanlines without the others: one at a time, what M-mode shows, many times a second; or those of packets.
 //!
-//! A line takes part of the face's scanlines: itself and those beside it that `beam` smooths over it. All else is as in
-//! an image, so that its samples are to the bit those of the image's line.
+//! They take part of the face's scanlines: themselves and those beside them that `beam` smooths over them. All else is as in
+//! an image, so that their samples are to the bit those of the image's lines.
+
+use std::ops::Range;
 
 use super::lane::{Shot, pixels};
 use super::layout::{self, LATERAL_REACH};
@@ -10,35 +12,55 @@ use super::{Outputs, SimError, Simulator};
 use crate::output::picture::grey;
 use crate::scene::Scene;
 
-/// A scanline that is made alone.
+/// Neighbouring scanlines that are made without the others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct OneLine {
-    /// Number on the face.
-    number: u32,
-    /// Grey levels from the face to the image's depth.
-    rows: u32,
-    /// Scanlines beside it, on each side, that are made: those that it is smoothed with, and those that the apertures of
+pub(super) struct LineRange {
+    /// Number on the face of the first one.
+    first: u32,
+    /// How many they are.
+    count: u32,
+    /// Samples that are made.
+    samples: u32,
+    /// Grey levels from the face to the image's depth, of a scanline that is shown alone; none: nothing is shown.
+    rows: Option<u32>,
+    /// Scanlines beside them, on each side, that are made: those that they are smoothed with, and those that the apertures of
     /// these reach over.
     reach: u32,
-    /// Scanlines beside it, on each side, that it is smoothed with.
+    /// Scanlines beside them, on each side, that they are smoothed with.
     smoothed: u32,
 }
 
-impl OneLine {
-    /// The constants of a frame of this line alone.
+impl LineRange {
+    /// The scanlines `lines`, up to sample `samples`, which nothing shows.
+    pub(super) fn of(scene: &Scene, tables: &Tables, lines: Range<u32>, samples: u32) -> Self {
+        let smoothed = smoothed(tables);
+        let reach = smoothed + aperture_reach(scene, tables);
+        let count = lines.end - lines.start;
+        Self { first: lines.start, count, samples, rows: None, reach, smoothed }
+    }
+
+    /// The constants of a frame of these scanlines alone.
     pub(super) fn narrow(&self, frame: &mut layout::Frame) {
         let lines = frame.scanlines;
-        let first = self.number.saturating_sub(self.reach);
+        // The scanlines that lie up to so many beside them.
+        let beside = |reach: u32| {
+            let first = self.first.saturating_sub(reach);
+            (first, (self.first + self.count + reach).min(lines) - first)
+        };
+        let (first, count) = beside(self.reach);
+        let (echo_first, echo_lines) = beside(self.smoothed);
         frame.first_line = first;
-        frame.scanlines = (self.number + self.reach + 1).min(lines) - first;
-        frame.lines_beside = lines - frame.scanlines;
-        frame.flags |= layout::FLAG_LINE;
-        frame.echo_first = self.number.saturating_sub(self.smoothed) - first;
-        frame.echo_lines = (self.number + self.smoothed + 1).min(lines) - first - frame.echo_first;
-        frame.image_width = 1;
-        frame.image_height = self.rows;
-        frame.image_left = (self.number - first) as f32;
-        frame.pixel_pitch = frame.depth / self.rows as f32;
+        frame.scanlines = count;
+        frame.lines_beside = lines - count;
+        (frame.echo_first, frame.echo_lines) = (echo_first - first, echo_lines);
+        frame.samples = self.samples.min(frame.samples);
+        if let Some(rows) = self.rows {
+            frame.flags |= layout::FLAG_LINE;
+            frame.image_width = 1;
+            frame.image_height = rows;
+            frame.image_left = (self.first - first) as f32;
+            frame.pixel_pitch = frame.depth / rows as f32;
+        }
     }
 }
 
@@ -95,9 +117,9 @@ impl Simulator {
         assert!(rows > 0 && u64::from(rows) <= most, "{rows} rows of a line");
         // Also the tables of settings that this frame is the first to have.
         self.adopt(scene)?;
-        let smoothed = smoothed(&self.tables);
-        let reach = smoothed + aperture_reach(scene, &self.tables);
-        let line = OneLine { number, rows, reach, smoothed };
+        let samples = scene.probe.samples;
+        let line = LineRange::of(scene, &self.tables, number..number + 1, samples);
+        let line = LineRange { rows: Some(rows), ..line };
         self.make(scene, &[Shot::of(scene, index)], Some(line), &Outputs::default())?;
         let rgba = self.read_again(pixels(false))?;
         Ok(grey(&rgba).collect())

@@ -45,6 +45,13 @@ push! {
         /// 1: main paths are followed once more, for their interactions only.
         again: u32,
     }
+    /// A dispatch of `scatter`.
+    "scatter" Scatter {
+        /// What it hears: bits [`PART_STILL`](super::layout::PART_STILL) and so on.
+        part: u32,
+        /// Time of a pulse, seconds from the frame's.
+        time: f32,
+    }
     /// A weighted sum of vectors of keyframes. All places are counted in vectors from the beginning of the buffer.
     "interpolate" Interpolate {
         /// Number of vectors to compute.
@@ -121,4 +128,10 @@ push! {
         /// Opacity, 0 to 1.
         opacity: f32,
     }
+}
+
+impl Scatter {
+    /// All scatterers, as an image has them.
+    pub const IMAGE: Self =
+        Self { part: super::layout::PART_STILL | super::layout::PART_FLOWING, time: 0.0 };
 }

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use super::batches::{Batches, FrameBudget};
 use super::contact::{self, Coupling};
 use super::lane::Shot;
-use super::line::OneLine;
+use super::line::LineRange;
 use super::passes::Passes;
 use super::stages::{inputs, label, trace};
 use super::tables::Tables;
@@ -24,7 +24,7 @@ impl Passes {
         tables: &Tables,
         coincident: bool,
         shots: &[Shot],
-        line: Option<OneLine>,
+        line: Option<LineRange>,
     ) -> Result<Duration, SimError> {
         cmd.scope("update");
         let began = Instant::now();
@@ -94,7 +94,7 @@ pub(super) fn frame_constants(
     world: &World,
     coincident: bool,
     budget: &FrameBudget,
-    line: Option<&OneLine>,
+    line: Option<&LineRange>,
 ) -> (layout::Frame, Batches) {
     if let Some(line) = line {
         line.narrow(&mut frame);

@@ -13,7 +13,7 @@ mod top;
 use std::sync::Arc;
 
 use super::bvh::{BvhError, Splits};
-use super::fields::{Carried, Fields, padded};
+use super::fields::{Fields, padded};
 use super::layout;
 use super::memory::Memory;
 use super::pass::Array;
@@ -71,9 +71,8 @@ pub struct World {
     revisions: Vec<u64>,
     /// The keyframes for which the memory was made; present shapes do not matter.
     made_for: Vec<Keyframes>,
-    /// The flows for which the memory was made, and what of them is on the device.
+    /// The flows for which the memory was made.
     flows: Vec<Flow>,
-    carried: Vec<Carried>,
     kernels: Arc<ShapeKernels>,
 }
 
@@ -152,13 +151,11 @@ impl World {
             return Err(WorldError::Selector(node.name.clone()));
         }
         // The kernels of the first update are compiled while the rest is made.
-        let reshapes = |i: &crate::scene::Instance| i.keyframes.strategy.needs_shared_topology();
-        let reshaped = scene.instances.iter().any(reshapes);
-        if reshaped || !scene.flows.is_empty() {
+        if scene.instances.iter().any(|i| i.keyframes.strategy.needs_shared_topology()) {
             kernels.interpolate.prepare();
-        }
-        if reshaped && tracer == Tracer::Bvh {
-            kernels.refit.prepare();
+            if tracer == Tracer::Bvh {
+                kernels.refit.prepare();
+            }
         }
         let most = device.limits().max_storage_buffer_bytes;
         let arrays = GeometryArrays::within(most, scene, tracer, splits, fields, &apart)?;
@@ -197,7 +194,6 @@ impl World {
             revisions: scene.instances.iter().map(|i| i.keyframes.revision).collect(),
             made_for: scene.instances.iter().map(|i| i.keyframes.clone()).collect(),
             flows: scene.flows.clone(),
-            carried: Vec::new(),
             kernels: Arc::clone(kernels),
         };
         let mut failed = None;

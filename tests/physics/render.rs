@@ -9,6 +9,7 @@ use glam::DVec3;
 use insonify::gpu;
 use insonify::scene::Scene;
 use insonify::sim::contact::{self, Coupling, Skins};
+use insonify::sim::push::Scatter;
 use insonify::sim::{Simulator, Tracer, layout, placement, shaders::Library, tables};
 use insonify_tools::reference::{Accumulator, Owned, Segment};
 use insonify_tools::reference::{axial, beam, detect, display, scatter};
@@ -104,7 +105,7 @@ pub fn twin_of(scene: &Scene, change: impl Fn(&mut Segment)) -> Frame {
     let traced = inputs.traced();
     let mut segments: Vec<Segment> = traced.segments.concat();
     segments.iter_mut().for_each(change);
-    let volume = scatter::scatter(&world, &segments);
+    let volume = scatter::scatter(&world, &segments, Scatter::IMAGE);
     let points = scatter::points(&world, &segments);
     let single = |v: Vec<f64>| v.iter().map(|&x| x as f32).collect::<Vec<f32>>();
     let (frame, rows) = (&inputs.frame, &inputs.rows);

@@ -6,8 +6,8 @@ use super::{Case, Check, Extent, Input, Job, Size, Subject, trace, worlds};
 use crate::reference::aperture::Passed;
 use crate::reference::{Segment, origin, scatter};
 use insonify::sim::layout::{self, Aperture, Counters, FLAG_VOXEL, Frame};
-use insonify::sim::stages;
 use insonify::sim::tables::with_spheres;
+use insonify::sim::{push, stages};
 
 /// Samples beyond the first window, in one case; no multiple of a bin or a slot.
 const BEYOND: u32 = 211;
@@ -122,7 +122,22 @@ fn job_of(mut job: Job, case: Case) -> Job {
         scanlines(&frame),
         apertures,
     ]);
-    Job::of(&stages::SCATTER, given, Vec::new())
+    Job::of(&stages::SCATTER, given, bytemuck::bytes_of(&heard(case)).to_vec())
+}
+
+/// What a case hears: all of it as an image does, or as a pulse of a packet, or of that alone what flows.
+fn heard(case: Case) -> push::Scatter {
+    use insonify::sim::layout::{PART_FLOWING, PART_PULSE, PART_STILL};
+    match case {
+        Case::NotFinite => {
+            push::Scatter { part: PART_STILL | PART_FLOWING | PART_PULSE, time: 2e-3 }
+        }
+        _ => push::Scatter::IMAGE,
+    }
+}
+
+fn push(job: &Job) -> push::Scatter {
+    bytemuck::pod_read_unaligned(&job.push)
 }
 
 /// One bad number in the first segment of each of nine lines.
@@ -153,7 +168,8 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     let segments: Vec<layout::Segment> = job.get("segments");
     let counts: Vec<u32> = job.get("segment_count");
     let held = held(&segments, &counts, frame);
-    let (twin, points) = (scatter::scatter(&world, &held), scatter::points(&world, &held));
+    let heard = push(job);
+    let (twin, points) = (scatter::scatter(&world, &held, heard), scatter::points(&world, &held));
     let [echoes, point_echoes] = ["volume_echoes", "point_echoes"].map(|name| {
         let echoes: Vec<i32> = job.after(outputs, name);
         echoes.into_iter().map(f64::from).collect::<Vec<f64>>()

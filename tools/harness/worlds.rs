@@ -9,8 +9,8 @@ use crate::reference::Owned;
 use insonify::scene::smoothed::smoothed;
 use insonify::scene::{Mesh, shapes};
 use insonify::sim::bvh::{BvhInstance, MeshBvh, SceneBvh};
-use insonify::sim::fields::{GENERATION, HEADER, padded};
-use insonify::sim::layout::{Frame, Instance, NONE, Surface, Tissue};
+use insonify::sim::fields::{HEADER, padded};
+use insonify::sim::layout::{FLOW_VECTORS, Frame, Instance, NONE, Surface, Tissue};
 use insonify::sim::lobe::Lobes;
 use insonify::sim::placement;
 
@@ -95,20 +95,17 @@ impl Builder {
         let (origin, spacing, size) = (DVec3::new(-6.0, -6.0, -30.0), 1.0, [13_u8, 13, 61]);
         let header = [origin, DVec3::splat(f64::recip(spacing)), DVec3::from(size.map(f64::from))];
         let header = header.map(|v| v.as_vec3().to_array());
-        let nodes = size.map(usize::from).iter().product::<usize>();
-        let next = 1 + header.len() + nodes;
         self.instances.last_mut().expect("placed").flow = self.fields.len() as u32;
-        for (weight, number, way, next) in [(0.8, 7.0, 3.0, next as f32), (0.6, 8.0, -2.0, 0.0)] {
-            self.fields.push([weight, number, next]);
-            self.fields.extend(header);
-            let along = |n: u8| (0..n).map(f64::from);
-            for _ in along(size[2]) {
-                for j in along(size[1]) {
-                    for i in along(size[0]) {
-                        let [x, y] = [origin.x + spacing * i, origin.y + spacing * j];
-                        let share = f64::max(1.0 - (x * x + y * y) / 16.0, 0.0);
-                        self.fields.push([0.0, 0.0, (way * share) as f32]);
-                    }
+        // Weight, number and way of each generation; pace, number and way of pulses.
+        self.fields.extend([[0.8, 7.0, 3.0], [0.6, 8.0, -2.0], [900.0, 7.0, 3.0]]);
+        self.fields.extend(header);
+        let along = |n: u8| (0..n).map(f64::from);
+        for _ in along(size[2]) {
+            for j in along(size[1]) {
+                for i in along(size[0]) {
+                    let [x, y] = [origin.x + spacing * i, origin.y + spacing * j];
+                    let share = f64::max(1.0 - (x * x + y * y) / 16.0, 0.0);
+                    self.fields.push([0.0, 0.0, share as f32]);
                 }
             }
         }
@@ -326,10 +323,8 @@ pub fn size(job: &Job, name: &str) -> usize {
                 header + nodes as usize
             };
             let deformed = instances.iter().filter(|i| i.field != NONE).map(|i| end(i.field));
-            let flows = instances.iter().filter(|i| i.flow != 0).map(|i| {
-                let next = fields.get(i.flow as usize).map_or(0.0, |head| head[2]);
-                end(i.flow + next as u32 + GENERATION)
-            });
+            let flows = instances.iter().filter(|i| i.flow != 0);
+            let flows = flows.map(|i| end(i.flow + FLOW_VECTORS));
             16 * deformed.chain(flows).max().unwrap_or(0)
         }
         _ => 0,

@@ -1,6 +1,8 @@
 //! Displacement fields: trilinear displacements over a grid.
 
 use glam::{DMat3, DVec3};
+use insonify::sim::layout::{FLOW_VECTORS, GENERATIONS, PART_PULSE};
+use insonify::sim::push::Scatter;
 
 /// One displacement field, in texture space, mm.
 #[derive(Clone, Copy, Debug)]
@@ -10,6 +12,8 @@ pub struct Field<'a> {
     scale: DVec3,
     size: [usize; 3],
     displacements: &'a [[f32; 3]],
+    /// Factor on them.
+    amount: f64,
 }
 
 /// One generation of scatterers of what flows.
@@ -24,19 +28,23 @@ pub struct Flowed<'a> {
 }
 
 impl<'a> Flowed<'a> {
-    /// The generations of which the first begins at vector `at` of `fields`: each a vector with weight, number and the
-    /// distance to the next one, and its field.
-    pub fn all(fields: &'a [[f32; 3]], mut at: u32) -> Vec<Self> {
-        let mut all = Vec::new();
-        loop {
-            let [weight, number, next] = fields[at as usize];
-            let field = Field::new(fields, at + 1);
-            all.push(Self { weight: weight.into(), generation: number as u32, field });
-            if next == 0.0 {
-                return all;
-            }
-            at += next as u32;
+    /// What is heard of what begins at vector `at` of `fields`: both generations, each of which has a vector with weight, number
+    /// and way, or of a pulse the one whose pace, number and way the third one says. Behind them stands the field of the flow's
+    /// shape.
+    pub fn all(fields: &'a [[f32; 3]], at: u32, heard: Scatter) -> Vec<Self> {
+        let shape = Field::new(fields, at + FLOW_VECTORS);
+        if heard.part & PART_PULSE != 0 {
+            let [pace, number, way] = fields[(at + GENERATIONS) as usize];
+            let amount = f64::from(way) + f64::from(pace) * f64::from(heard.time);
+            let field = Field { amount, ..shape };
+            return vec![Self { weight: 1.0, generation: number as u32, field }];
         }
+        let of = |[weight, number, way]: [f32; 3]| Self {
+            weight: weight.into(),
+            generation: number as u32,
+            field: Field { amount: way.into(), ..shape },
+        };
+        (at..at + GENERATIONS).map(|at| of(fields[at as usize])).collect()
     }
 }
 
@@ -56,6 +64,7 @@ impl<'a> Field<'a> {
             scale: widen(*scale),
             size,
             displacements: &displacements[..size.iter().product()],
+            amount: 1.0,
         }
     }
 
@@ -78,7 +87,7 @@ impl<'a> Field<'a> {
             let far = [n & 1, n >> 1 & 1, n >> 2];
             let [nx, ny, _] = self.size;
             let node = i + far[0] + nx * (j + far[1] + ny * (k + far[2]));
-            let d = widen(self.displacements[node]);
+            let d = self.amount * widen(self.displacements[node]);
             let side = |a: usize| if far[a] == 1 { t[a] } else { 1.0 - t[a] };
             let sign = |a: usize| if far[a] == 1 { 1.0 } else { -1.0 };
             v += side(0) * side(1) * side(2) * d;
@@ -122,7 +131,7 @@ impl<'a> Field<'a> {
     /// Bound on the displacements, mm: a trilinear one lies between those of its cell's nodes.
     pub fn reach(&self) -> f64 {
         let longest = |reach: f64, &d: &[f32; 3]| reach.max(widen(d).length());
-        self.displacements.iter().fold(0.0, longest)
+        self.amount.abs() * self.displacements.iter().fold(0.0, longest)
     }
 
     /// Bound on the gradient: the largest change of displacement per mm between two points. Along an
@@ -141,7 +150,7 @@ impl<'a> Field<'a> {
             largest(nx, &|i| i / nx % ny > 0),
             largest(nx * ny, &|_| true),
         );
-        (slopes * self.scale).length()
+        self.amount.abs() * (slopes * self.scale).length()
     }
 }
 

@@ -12,9 +12,10 @@ use super::geometry::{beam_weight, line_pitch, probe, world_line};
 use super::world::World;
 use super::{Accumulator, Segment};
 use insonify::sim::layout::{
-    FLAG_VOXEL, LEAST_PITCH, MOST_WIDENED, Row, SCATTER_BIN, SCATTER_SLOT, STRIP_CUT, STRIP_LIMIT,
-    Tissue, UNHEARD,
+    FLAG_VOXEL, LEAST_PITCH, MOST_WIDENED, PART_FLOWING, PART_STILL, Row, SCATTER_BIN,
+    SCATTER_SLOT, STRIP_CUT, STRIP_LIMIT, Tissue, UNHEARD,
 };
+use insonify::sim::push::Scatter;
 
 /// Shift of the layers' borders, in their pitch, off the round numbers at which points lie: by rounding a point
 /// could belong to two layers or to none.
@@ -108,13 +109,13 @@ pub(super) fn is_finite(s: &Segment) -> bool {
     numbers.into_iter().all(f64::is_finite) && vectors.iter().all(|v| v.is_finite())
 }
 
-/// Echoes of the scatterers along all segments, in units of 1 / volume_scale.
-pub fn scatter(world: &World, segments: &[Segment]) -> Accumulator {
+/// Echoes of the scatterers along all segments that a dispatch hears, in units of 1 / volume_scale.
+pub fn scatter(world: &World, segments: &[Segment], heard: Scatter) -> Accumulator {
     let mut out = Accumulator::new(world.frame);
     // Of each instance as many as it has generations of scatterers; none where it is rigid.
     let deformed = |instance: u32| -> Vec<Deformed<'_>> {
         let field = world.field(instance);
-        let flows = world.flows(instance);
+        let flows = world.flows(instance, heard);
         match (flows.is_empty(), field) {
             (false, field) => flows
                 .into_iter()
@@ -145,7 +146,9 @@ pub fn scatter(world: &World, segments: &[Segment]) -> Accumulator {
         let all = fields.get(segment.instance as usize).map_or(&[][..], Vec::as_slice);
         let space = world.texture(segment.instance);
         let tube = Tube::new(world, segment, space, all.first().copied());
-        if !tube.sounds() {
+        let flows = all.iter().any(|of| of.fields[0].is_some());
+        let part = if flows { PART_FLOWING } else { PART_STILL };
+        if !tube.sounds() || heard.part & part == 0 {
             continue;
         }
         if world.frame.flags & FLAG_VOXEL != 0 {

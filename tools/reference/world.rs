@@ -6,6 +6,7 @@ use super::field::{Field, Flowed};
 use super::stack::Stack;
 use insonify::scene::triangle;
 use insonify::sim::layout::{Aperture, Frame, Instance, NONE, Row, Rows, Surface, Tissue};
+use insonify::sim::push::Scatter;
 
 /// Distance, mm, below which crossings of one instance from one side are one crossing: a ray
 /// through an edge meets both its triangles.
@@ -248,11 +249,11 @@ impl World<'_> {
         (at != NONE).then(|| Field::new(self.fields, at))
     }
 
-    /// The generations of scatterers of what flows in `instance`; none where nothing does.
-    pub fn flows(&self, instance: u32) -> Vec<Flowed<'_>> {
+    /// The generations of scatterers of what flows in `instance` that are heard; none where nothing flows.
+    pub fn flows(&self, instance: u32, heard: Scatter) -> Vec<Flowed<'_>> {
         let world = self.frame.flags & insonify::sim::layout::FLAG_WORLD_TEXTURE != 0;
         let at = if instance == NONE || world { 0 } else { self.instances[instance as usize].flow };
-        if at == 0 { Vec::new() } else { Flowed::all(self.fields, at) }
+        if at == 0 { Vec::new() } else { Flowed::all(self.fields, at, heard) }
     }
 
     /// The place in the reference shape, in texture space, of the tissue that is at `p` in the world.

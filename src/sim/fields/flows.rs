@@ -1,53 +1,37 @@
 //! Displacements of blood by its flow: where each generation of scatterers has been carried from where it rests.
 //!
-//! What flows in an instance has a field of the flow's shape, which never changes, and for each of its two generations a
-//! field that is the shape times its way until now. Before the second kind of field stands a vector: the generation's
-//! weight, its number, and how many vectors farther on the next generation's begins; 0: it is the last.
+//! What flows in an instance has the field of the flow's shape, which never changes; where scatterers are now it says times
+//! their way. Before it stand three vectors with what changes from frame to frame: of each generation weight, number and way,
+//! and what pulses of a packet hear, the louder one of them: pace (mm/s), number and way.
 
 use glam::{DAffine3, DVec3};
 
-use super::{FieldBlend, Fields, Grid, HEADER, texture_from_object};
+use super::{Fields, Grid, texture_from_object};
+use crate::layout::FLOW_VECTORS;
 use crate::placement::rigid;
 use crate::scene::flow::{Flow, FlowShape};
 use crate::scene::{Instance, Scene};
 use crate::settings::TextureSpace;
-
-/// Vectors before the header of a generation's field.
-pub const GENERATION: u32 = 1;
 
 /// Nodes across the narrowest radius of a tube: between them a parabola is missed by 1 / (4 * 6^2) of its height at most.
 const NODES_PER_RADIUS: f64 = 6.0;
 /// Most nodes of a field: 2 MB.
 const MOST_NODES: usize = 1 << 17;
 
-/// The places of what flows in one instance, in vectors of [`Fields::values`].
+/// The place of what flows in one instance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct FlowSlots {
-    /// The first vector of the shape.
-    shape: u32,
-    /// The vector before the first generation's header.
+    /// The first generation's vector, in [`Fields::values`].
     first: u32,
-    /// Number of nodes.
-    nodes: u32,
     /// Life of a generation, s.
     lifetime: f64,
 }
 
-impl FlowSlots {
-    /// Vectors from one generation to the next.
-    fn stride(&self) -> u32 {
-        GENERATION + HEADER + self.nodes
-    }
-}
+/// The vectors before the field of a flow.
+type Vectors = [[f32; 3]; FLOW_VECTORS as usize];
 
-/// What the device writes before a frame for one generation.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Carried {
-    /// Place of the vector before its field, and the vector.
-    pub(crate) head: (u32, [f32; 3]),
-    /// Its field.
-    pub(crate) field: FieldBlend,
-}
+/// What a flow has carried: the vectors before its field, and their place in [`Fields::values`].
+pub(crate) type Carried = (u32, Vectors);
 
 impl Fields {
     /// Appends the fields of everything that flows.
@@ -56,25 +40,18 @@ impl Fields {
         for flow in &scene.flows {
             let instance = &scene.instances[flow.instance];
             let rest = self.rests[flow.instance].unwrap_or(instance.world_from_object);
-            let (grid, shape) = of_shape(scene, instance, &flow.shape, &rest);
-            let nodes = shape.len();
-            let header = grid.header();
-            self.values.extend(header);
-            let at = self.values.len() as u32;
-            self.values.extend(shape);
-            let slots = FlowSlots {
-                shape: at,
-                first: self.values.len() as u32,
-                nodes: nodes as u32,
-                lifetime: flow.lifetime(&rest),
-            };
-            for _ in 0..2 {
+            // 0 is the place of no flow.
+            if self.values.is_empty() {
                 self.values.push([0.0; 3]);
-                self.values.extend(header);
-                self.values.resize(self.values.len() + nodes, [0.0; 3]);
             }
-            self.flows[flow.instance] = Some(slots);
+            let first = self.values.len() as u32;
+            self.values.resize(self.values.len() + FLOW_VECTORS as usize, [0.0; 3]);
+            let (grid, shape) = of_shape(scene, instance, &flow.shape, &rest);
+            self.values.extend(grid.header());
+            self.values.extend(shape);
+            self.flows[flow.instance] = Some(FlowSlots { first, lifetime: flow.lifetime(&rest) });
         }
+        self.carry(scene);
     }
 
     /// The offset, in vectors, of what flows in instance `i`; 0 where nothing does, or where
@@ -84,26 +61,30 @@ impl Fields {
         self.flows[i].filter(|_| moves).map_or(0, |slots| slots.first)
     }
 
-    /// What the device has to write before a frame of `scene` as it is now.
-    pub(crate) fn carried(&self, scene: &Scene) -> Vec<Carried> {
-        let of = |flow: &Flow| {
+    /// Updates what the flows have carried to the scene as it is now. Returns what has changed.
+    pub(crate) fn carry(&mut self, scene: &Scene) -> Vec<Carried> {
+        let mut changed = Vec::new();
+        for flow in &scene.flows {
             let slots = self.flows[flow.instance].expect("made for these flows");
-            let generations = flow.generations(slots.lifetime).into_iter().enumerate();
-            generations.map(move |(i, generation)| {
-                let at = slots.first + i as u32 * slots.stride();
-                let next = if i == 0 { slots.stride() as f32 } else { 0.0 };
-                Carried {
-                    head: (at, [generation.weight as f32, generation.number as f32, next]),
-                    field: FieldBlend {
-                        sources: [(slots.shape, generation.way), (0, 0.0), (0, 0.0), (0, 0.0)],
-                        target: at + GENERATION + HEADER,
-                        count: slots.nodes,
-                    },
-                }
-            })
-        };
-        scene.flows.iter().flat_map(of).collect()
+            let now = vectors(flow, slots.lifetime);
+            let at = slots.first as usize;
+            let kept = &mut self.values[at..at + now.len()];
+            if *kept != now {
+                kept.copy_from_slice(&now);
+                changed.push((slots.first, now));
+            }
+        }
+        changed
     }
+}
+
+fn vectors(flow: &Flow, lifetime: f64) -> Vectors {
+    let generations = flow.generations(lifetime);
+    let [first, second] = generations;
+    let louder = if second.weight > first.weight { second } else { first };
+    let pulses = [flow.pace(1.0) as f32, louder.number as f32, louder.way as f32];
+    let [first, second] = generations.map(|g| [g.weight as f32, g.number as f32, g.way as f32]);
+    [first, second, pulses]
 }
 
 /// The shape of a flow, and the grid on which it is given: in the texture space of its instance, over all its shapes.

@@ -1,9 +1,7 @@
-//! Blood that flows: the device computes before a frame where each generation of its scatterers is.
+//! Blood that flows: what its scatterers have been carried by until a frame.
 
-use super::{ShapeKernels, World};
-use crate::fields::Carried;
-use crate::gpu::{Binding, Commands, GpuError, Stage};
-use crate::push;
+use super::{World, padded};
+use crate::gpu::{Commands, GpuError};
 use crate::scene::Scene;
 
 impl World {
@@ -13,37 +11,11 @@ impl World {
         commands: &mut Commands<'_>,
         scene: &Scene,
     ) -> Result<bool, GpuError> {
-        let carried = self.fields.carried(scene);
-        if carried == self.carried {
-            return Ok(false);
-        }
-        for Carried { head: (at, [weight, number, next]), .. } in &carried {
+        let carried = self.fields.carry(scene);
+        for (at, vectors) in &carried {
             let place = u64::from(*at) * size_of::<[f32; 4]>() as u64;
-            let vector = [*weight, *number, *next, 0.0];
-            commands.write(&self.geometry.fields, place, bytemuck::cast_slice(&vector))?;
+            commands.write(&self.geometry.fields, place, bytemuck::cast_slice(&padded(vectors)))?;
         }
-        // All lie in one buffer: a barrier between two that write it.
-        commands.barrier(Stage::Transfer, Stage::Compute);
-        for Carried { field, .. } in &carried {
-            let push = push::Interpolate {
-                count: field.count,
-                target: field.target,
-                sources: field.sources.map(|(at, _)| at),
-                weights: field.sources.map(|(_, weight)| weight as f32),
-                stride: 4,
-                ..push::Interpolate::default()
-            };
-            let ShapeKernels { interpolate, .. } = &*self.kernels;
-            let bindings = [Binding::Buffer(&self.geometry.fields)];
-            commands.dispatch(
-                interpolate,
-                [push.count, 1, 1],
-                bytemuck::bytes_of(&push),
-                &bindings,
-            )?;
-            commands.barrier(Stage::Compute, Stage::Compute);
-        }
-        self.carried = carried;
-        Ok(true)
+        Ok(!carried.is_empty())
     }
 }

@@ -125,7 +125,7 @@ fn mean_power(fixture: &mut Fixture, segments: &[Segment]) -> f64 {
     let mut power = 0.0;
     for seed in 0..6 {
         fixture.tissues[0].seed = seed;
-        let out = scatter(&fixture.world(), segments);
+        let out = scatter(&fixture.world(), segments, Scatter::IMAGE);
         power += (20..220).map(|k| magnitude(&out, k).powi(2)).sum::<f64>();
     }
     power / 1200.0
@@ -177,11 +177,14 @@ fn a_cut_segment_sums_to_the_whole() {
             ..whole
         };
         let halves = [Segment { length: cut, ..whole }, rest];
-        let (a, b) = (scatter(&fixture.world(), &[whole]), scatter(&fixture.world(), &halves));
+        let (a, b) = (
+            scatter(&fixture.world(), &[whole], Scatter::IMAGE),
+            scatter(&fixture.world(), &halves, Scatter::IMAGE),
+        );
         assert!(a.exact.iter().any(|&v| v != 0.0));
         assert!(worst(&a, &b) < 1e-9, "{}", worst(&a, &b));
         assert!(
-            worst(&a, &scatter(&fixture.world(), &halves[..1])) > 1e-2,
+            worst(&a, &scatter(&fixture.world(), &halves[..1], Scatter::IMAGE)) > 1e-2,
             "a lost half is caught"
         );
     }
@@ -192,7 +195,7 @@ fn the_lattice_moves_with_its_instance() {
     let mut fixture = Fixture::new(vec![tissue(1.5, 1.5, 0.0)]);
     fixture.block([-1.0; 3], [1.0; 3], 0, 0);
     let still = Segment { instance: 0, ..segment(20.0) };
-    let a = scatter(&fixture.world(), &[still]);
+    let a = scatter(&fixture.world(), &[still], Scatter::IMAGE);
     // A quarter turn and whole millimetres: exact in f32.
     let turn = DAffine3 {
         matrix3: glam::DMat3::from_cols(DVec3::Y, -DVec3::X, DVec3::Z),
@@ -205,10 +208,10 @@ fn the_lattice_moves_with_its_instance() {
         lateral: turn.transform_vector3(still.lateral),
         ..still
     };
-    assert!(worst(&a, &scatter(&fixture.world(), &[moved])) < 1e-9);
+    assert!(worst(&a, &scatter(&fixture.world(), &[moved], Scatter::IMAGE)) < 1e-9);
     fixture.frame.flags = insonify::sim::layout::FLAG_WORLD_TEXTURE;
     assert!(
-        worst(&a, &scatter(&fixture.world(), &[moved])) > 0.1,
+        worst(&a, &scatter(&fixture.world(), &[moved], Scatter::IMAGE)) > 0.1,
         "now it slides through the world"
     );
 }
@@ -259,7 +262,7 @@ fn voxels_are_one_sample_each_and_as_bright_as_their_presence() {
     fixture.frame.flags = FLAG_VOXEL;
     fixture.tissues[0].presence = 0.4;
     fixture.frame.cell = 0.25;
-    let out = scatter(&fixture.world(), &[segment(60.0)]);
+    let out = scatter(&fixture.world(), &[segment(60.0)], Scatter::IMAGE);
     assert!(out.deposits.iter().sum::<u32>() <= 240);
     let got = mean_power(&mut fixture, &[segment(60.0)]);
     // One echo per sample.
@@ -298,7 +301,7 @@ fn a_lens_dims_speckle_by_what_it_widens_the_beam() {
     let mut fixture = Fixture::new(vec![tissue(1.5, 1.5, 0.0)]);
     let mut measured = |s: Segment| {
         let power = mean_power(&mut fixture, &[s]);
-        (power, scatter(&fixture.world(), &[s]).deposits)
+        (power, scatter(&fixture.world(), &[s], Scatter::IMAGE).deposits)
     };
     // Both beams, which converge there, have a variance more by 0.96 mm^2; without a lens they add up to 0.64 mm^2.
     let (even, behind) = (
@@ -347,7 +350,8 @@ fn a_wider_strip_is_as_bright_with_more_scatterers() {
         for seed in 0..10 {
             fixture.frame.cell = 0.25 + 1e-3 * seed as f32;
             power += mean_power(&mut fixture, &[s]) / 10.0;
-            deposits += scatter(&fixture.world(), &[s]).deposits.iter().sum::<u32>();
+            deposits +=
+                scatter(&fixture.world(), &[s], Scatter::IMAGE).deposits.iter().sum::<u32>();
         }
         (power, f64::from(deposits))
     };
@@ -376,7 +380,7 @@ fn neighbouring_strips_share_scatterers_without_gaps() {
             ..segment(60.0)
         });
         let lines: Vec<Segment> = lines.map(|s| Segment { strip: [distance, 0.0], ..s }).collect();
-        let out = scatter(&fixture.world(), &lines);
+        let out = scatter(&fixture.world(), &lines, Scatter::IMAGE);
         let line = |l: usize| &out.exact[l * 800..(l + 1) * 800];
         (0..800).map(|i| line(1)[i] + line(2)[i] + line(3)[i]).collect::<Vec<f64>>()
     };
@@ -402,7 +406,7 @@ fn neighbouring_strips_share_scatterers_without_gaps() {
 /// What the middle one of five lines hears alone.
 fn of_middle(fixture: &Fixture) -> Vec<f64> {
     let s = Segment { strip: [0.8, 0.0], line: 2, ..segment(60.0) };
-    scatter(&fixture.world(), &[s]).exact[1600..2400].to_vec()
+    scatter(&fixture.world(), &[s], Scatter::IMAGE).exact[1600..2400].to_vec()
 }
 
 // If a second path is 20 dB louder, the first one needs a hundredth of its scatterers; its level stays the same.
@@ -417,7 +421,7 @@ fn masked_tissue_is_as_bright_with_fewer_scatterers() {
     let faint = Segment { weight: 0.1, ..segment(60.0) };
     let loud = Segment { tissue: 1, ..segment(60.0) };
     let count = |fixture: &Fixture, segments: &[Segment]| {
-        let out = scatter(&fixture.world(), segments);
+        let out = scatter(&fixture.world(), segments, Scatter::IMAGE);
         out.exact.chunks(2).filter(|v| v[0] != 0.0 || v[1] != 0.0).count()
     };
     let alone = count(&fixture, &[faint]);

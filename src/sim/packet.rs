@@ -1,0 +1,138 @@
+//! Packets of pulses: the same scanlines again and again within milliseconds, of which what flows changes.
+
+use std::ops::Range;
+
+use super::lane::Shot;
+use super::layout::{AXIAL_REACH, Frame, PART_FLOWING, PART_PULSE, PART_STILL, SCATTER_BIN};
+use super::line::LineRange;
+use super::pass::{Array, Sizes};
+use super::push::Scatter;
+use super::stages::{AXIAL, BEAM, axial, inputs, scatter};
+use super::{SimError, Simulator};
+use crate::gpu::{BufferKind, Stage};
+use crate::output::npy::Element::{Integer, Word};
+use crate::scene::Scene;
+
+/// Largest packet that is kept on the device, bytes: half of what a signed offset could address.
+const MOST_BYTES: u64 = 1 << 30;
+
+/// Echoes of the scatterers that do not flow.
+const STILL_ECHOES: Array = Array::new("still_echoes", Integer, 2, Sizes::samples);
+/// The frame's constants with the noise of one pulse.
+const PULSE_FRAME: Array = Array::of::<Frame>("pulse_frame", Word, |_| 1);
+
+/// The pulses of a packet, and what of their echoes is wanted.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Packet {
+    /// Time of each pulse, s from the scene's.
+    pub times: Vec<f64>,
+    /// Scanlines.
+    pub lines: Range<u32>,
+    /// Samples of each.
+    pub samples: Range<u32>,
+}
+
+impl Packet {
+    /// Pulses that follow each other `rate` times a second, of which the scene's time is the middle.
+    pub fn even(count: u32, rate: f64, lines: Range<u32>, samples: Range<u32>) -> Self {
+        let middle = (f64::from(count) - 1.0) / 2.0;
+        let times = (0..count).map(|n| (f64::from(n) - middle) / rate).collect();
+        Self { times, lines, samples }
+    }
+
+    /// Returns whether it has the place of this column and row, among the scanlines and samples of the image.
+    pub fn holds(&self, [column, row]: [f64; 2]) -> bool {
+        let within = |v: f64, span: &Range<u32>| {
+            (f64::from(span.start) - 0.5..f64::from(span.end) - 0.5).contains(&v)
+        };
+        within(column, &self.lines) && within(row, &self.samples)
+    }
+}
+
+impl Simulator {
+    /// The echoes of a packet of pulses: complex baseband by pulse, scanline and sample, as [`Self::iq`] has it of an image.
+    /// Tissue is as at the scene's time; what flows is carried on from there at its present speed. Noise differs from pulse
+    /// to pulse; `index` selects it. Costs a frame of these scanlines, and for each pulse what flows there.
+    ///
+    /// # Errors
+    /// Those of [`Self::frame`]; device out of memory.
+    ///
+    /// # Panics
+    /// Without pulses, or with scanlines or samples that the probe does not have.
+    pub fn packet(
+        &mut self,
+        scene: &Scene,
+        index: u32,
+        packet: &Packet,
+    ) -> Result<Vec<[f32; 2]>, SimError> {
+        let Packet { times, lines, samples } = packet;
+        let probe = &scene.probe;
+        assert!(lines.start < lines.end && lines.end <= probe.scanlines, "scanlines {lines:?}");
+        assert!(samples.start < samples.end && samples.end <= probe.samples, "samples {samples:?}");
+        assert!(!times.is_empty(), "a packet without pulses");
+        self.adopt(scene)?;
+        // A scatterer echoes up to two bins beside its own.
+        let last = (samples.end + AXIAL_REACH as u32).next_multiple_of(SCATTER_BIN);
+        let last = last + 2 * SCATTER_BIN;
+        let range = LineRange::of(scene, &self.tables, lines.clone(), last);
+        let passes = &mut self.passes;
+        let mut cmd = self.submissions.begin()?;
+        let shots = [Shot::of(scene, index)];
+        passes.update(&mut cmd, scene, &self.tables, self.coincident, &shots, Some(range))?;
+        passes.touch(&mut cmd, scene, &shots)?;
+        let own = [&STILL_ECHOES, &PULSE_FRAME].into_iter();
+        passes.lanes[0].buffers.add(cmd.device(), own)?;
+        let sizes = passes.batches.sizes(passes.frame(), &self.tables);
+        let frame = *passes.frame();
+        let each = u64::from(samples.end - samples.start) * 8;
+        let bytes = each * u64::from(lines.end - lines.start) * times.len() as u64;
+        if bytes > MOST_BYTES {
+            return Err(SimError::Packet { bytes, most: MOST_BYTES });
+        }
+        let copy = cmd.device().buffer("packet", bytes, BufferKind::Readback)?;
+        // Where all paths fit into one batch their segments stay, and what does not flow is heard once.
+        let once = passes.batches.paths >= frame.paths;
+        let volume = sizes.samples() * 8;
+        for (n, time) in times.iter().enumerate() {
+            let pulse = |part: u32| Scatter { part: part | PART_PULSE, time: *time as f32 };
+            if n == 0 || !once {
+                passes.clear(&mut cmd, &sizes);
+                let part = if once { PART_STILL } else { PART_STILL | PART_FLOWING };
+                passes.echoes(&mut cmd, pulse(part), false)?;
+            }
+            let buffers = &passes.lanes[0].buffers;
+            if once {
+                let (from, to) = match n {
+                    0 => (&scatter::VOLUME_ECHOES, &STILL_ECHOES),
+                    _ => (&STILL_ECHOES, &scatter::VOLUME_ECHOES),
+                };
+                cmd.barrier(Stage::Compute, Stage::Transfer);
+                cmd.copy((&buffers[from], 0), (&buffers[to], 0), volume)?;
+            }
+            let noise = frame.frame_index.wrapping_add((n as u32).wrapping_mul(0x9e37_79b9));
+            let constants = Frame { frame_index: noise, ..frame };
+            cmd.write(&buffers[&PULSE_FRAME], 0, bytemuck::bytes_of(&constants))?;
+            cmd.barrier(Stage::Transfer, Stage::Compute);
+            if once {
+                passes.scatter(&mut cmd, pulse(PART_FLOWING))?;
+            }
+            passes.run_with(&mut cmd, &BEAM, &|lane| {
+                vec![(&inputs::FRAME, &lane.buffers[&PULSE_FRAME])]
+            })?;
+            passes.run(&mut cmd, &AXIAL)?;
+            cmd.barrier(Stage::Compute, Stage::Transfer);
+            for (l, line) in lines.clone().enumerate() {
+                let own = u64::from(line - frame.first_line) * u64::from(frame.samples);
+                let from = (own + u64::from(samples.start)) * 8;
+                let to = (n as u64 * u64::from(lines.end - lines.start) + l as u64) * each;
+                cmd.copy((&passes.lanes[0].buffers[&axial::IQ], from), (&copy, to), each)?;
+            }
+            cmd.barrier(Stage::Transfer, Stage::Compute);
+        }
+        cmd.barrier(Stage::Transfer, Stage::Host);
+        cmd.submit()?;
+        let mut out = vec![[0.0; 2]; (bytes / 8) as usize];
+        self.submissions.read(&copy, bytemuck::cast_slice_mut(&mut out))?;
+        Ok(out)
+    }
+}
