@@ -16,6 +16,7 @@ mod acquire;
 mod cli;
 mod dataset;
 mod defects;
+mod doppler;
 mod drivers;
 mod igtl;
 mod import;

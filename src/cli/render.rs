@@ -6,6 +6,7 @@ use miette::{IntoDiagnostic, Result, miette};
 use serde_json::{Map, Value, json};
 
 use super::common::{self, Common, Progress, Stage};
+use insonify::doppler::ColourMode;
 use insonify::gpu::{Device, FrameTimings, peak_bytes};
 use insonify::output;
 use insonify::scene::{Scene, file, shipped};
@@ -18,6 +19,7 @@ use insonify::sim::shaders::Library;
 use insonify::sim::{Shot, Simulator, Tracer};
 use insonify::statistics::Statistics;
 
+mod coloured;
 mod film;
 mod labels;
 mod moments;
@@ -66,6 +68,10 @@ pub struct Render {
     /// is outside. Several frames are numbered as images are.
     #[arg(long, value_name = "FILE")]
     labels: Option<PathBuf>,
+    /// Colours the image by a packet of pulses in the colour box of the scene's [doppler]: `color` shows velocities, red towards
+    /// the probe and blue away from it, `power` how much moves. PNG only.
+    #[arg(long, value_enum)]
+    mode: Option<ColourMode>,
     /// Writes every stage as a numbered array with its axes into this folder.
     #[arg(long, value_name = "DIR")]
     dump: Option<PathBuf>,
@@ -99,6 +105,9 @@ pub fn run(args: &Render) -> Result<()> {
     let moments = moments(args, &scene)?;
     let frames = u32::try_from(moments.len()).expect("no more than can be asked for");
     film::check(&output, frames)?;
+    if args.mode.is_some() {
+        film::check_colour(&output)?;
+    }
     if let Some(labels) = &args.labels {
         labels::check(labels, frames, &scene)?;
         scene.simulation.labels = true;
@@ -296,7 +305,9 @@ fn simulate(
     let mut progress = Progress::new(frames, "frames");
     let mut timings = Vec::new();
     let mut unseen = scene.masks_off_the_image();
-    for group in groups(&moments, scene, simulator.most_shots()) {
+    // Packets are made one by one, each behind its image.
+    let at_once = if args.mode.is_some() { 1 } else { simulator.most_shots() };
+    for group in groups(&moments, scene, at_once) {
         reload(simulator, library);
         scene.set_time(moments[group.start].seconds);
         let mut shots = Vec::new();
@@ -312,10 +323,10 @@ fn simulate(
         for (place, (index, shot)) in group.zip(&shots).enumerate() {
             simulator.choose(place);
             scene.world_from_probe = shot.world_from_probe;
-            film.add(index as u32, simulator, scene)?;
             if let Some(labels) = &labels {
                 labels.add(index as u32, simulator, scene)?;
             }
+            film.add(index as u32, simulator, scene, args.mode)?;
             progress.done(index as u32 + 1);
         }
         let took = simulator.wait().into_diagnostic()?.pop().unwrap_or_default();

@@ -10,6 +10,7 @@ use insonify_sim as sim;
 
 pub mod acquire;
 pub mod dataset;
+pub mod doppler;
 pub mod exam;
 pub mod exchange;
 pub mod igtl;

@@ -59,7 +59,7 @@ pub use wire::Wire;
 
 use crate::probe::Probe;
 use crate::settings::Settings;
-pub use crate::settings::{Display, Fusion, Imaging, Live, Simulation, Surface, Tissue};
+pub use crate::settings::{Display, Doppler, Fusion, Imaging, Live, Simulation, Surface, Tissue};
 
 /// Everything that a frame depends on.
 #[derive(Clone, Debug)]
@@ -98,6 +98,8 @@ pub struct Scene {
     pub tracker: Tracker,
     /// Blood that flows, at most one flow for an instance.
     pub flows: Vec<Flow>,
+    /// Colour Doppler.
+    pub doppler: Doppler,
     /// Live quality while something moves.
     pub live: Live,
     /// Places of its parts in the scene file.
@@ -139,6 +141,7 @@ impl Scene {
             contact: None,
             tracker: Tracker::default(),
             live: Live::default(),
+            doppler: Doppler::default(),
             flows: Vec::new(),
             origins: Origins::default(),
         }

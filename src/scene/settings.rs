@@ -3,6 +3,7 @@
 //! Reading and writing scene files, `--set`, undo, the console, parameter studies, matching and the tables of
 //! `docs/scenes.md` are loops over the rows. Knows no file, no window and no kernel.
 
+mod doppler;
 mod exam;
 mod field;
 mod fusion;
@@ -20,6 +21,7 @@ pub mod units;
 mod value;
 mod words;
 
+pub use doppler::{Doppler, WallFilter};
 pub use exam::Exam;
 pub use field::Field;
 pub use fusion::{Blend, Display, Fusion, MaskSpeed, Surroundings};

@@ -12,10 +12,26 @@ pub fn grey(rgba: &[u8]) -> impl Iterator<Item = u8> {
 /// When `rgba` has not `4 * width * height` bytes.
 pub fn grey_png([width, height]: [u32; 2], rgba: &[u8], pitch: f64, text: Option<&str>) -> Vec<u8> {
     let grey: Vec<u8> = grey(rgba).collect();
+    encoded([width, height], png::ColorType::Grayscale, &grey, pitch, text)
+}
+
+/// The PNG of the colours of RGBA pixels whose edges are `pitch` mm, with `text` in it as [`grey_png`] has it.
+pub fn colour_png(size: [u32; 2], rgba: &[u8], pitch: f64, text: Option<&str>) -> Vec<u8> {
+    let rgb: Vec<u8> = rgba.chunks_exact(4).flat_map(|p| [p[0], p[1], p[2]]).collect();
+    encoded(size, png::ColorType::Rgb, &rgb, pitch, text)
+}
+
+fn encoded(
+    [width, height]: [u32; 2],
+    kind: png::ColorType,
+    pixels: &[u8],
+    pitch: f64,
+    text: Option<&str>,
+) -> Vec<u8> {
     let per_metre = (1000.0 / pitch).round() as u32;
     let mut out = Vec::new();
     let mut encoder = png::Encoder::new(&mut out, width, height);
-    encoder.set_color(png::ColorType::Grayscale);
+    encoder.set_color(kind);
     encoder.set_pixel_dims(Some(png::PixelDimensions {
         xppu: per_metre,
         yppu: per_metre,
@@ -26,10 +42,10 @@ pub fn grey_png([width, height]: [u32; 2], rgba: &[u8], pitch: f64, text: Option
         added.expect("nothing is written yet");
     }
     let written = encoder.write_header().and_then(|mut writer| {
-        writer.write_image_data(&grey)?;
+        writer.write_image_data(pixels)?;
         writer.finish()
     });
-    written.expect("one byte per pixel, into memory");
+    written.expect("as many bytes as its pixels have, into memory");
     out
 }
 

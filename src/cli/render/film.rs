@@ -6,15 +6,17 @@ use glam::DAffine3;
 use miette::{IntoDiagnostic, Result, miette};
 use serde_json::{Map, Value, json};
 
+use super::coloured::coloured;
 use super::moments::Moment;
 use crate::cli::common;
 use crate::cli::images::Images;
 use insonify::acquire::Recording;
+use insonify::doppler::ColourMode;
 use insonify::exchange::{self, Format, Frames};
 use insonify::output;
 use insonify::output::dicom::About;
 use insonify::output::mp4::Mp4;
-use insonify::output::picture::grey_png;
+use insonify::output::picture::{colour_png, grey_png};
 use insonify::output::{files, film};
 use insonify::scene::Scene;
 use insonify::sim::Simulator;
@@ -76,6 +78,21 @@ pub fn check(output: &Path, frames: u32) -> Result<()> {
     }
 }
 
+/// Refuses a file that holds no colours.
+///
+/// # Errors
+/// Another file than a picture.
+pub fn check_colour(output: &Path) -> Result<()> {
+    match ends(output, ["png", ""]) {
+        true => Ok(()),
+        false => Err(miette!(
+            help = "end the name in .png; several frames are numbered",
+            "{} holds grey images, and --mode colours them",
+            output.display()
+        )),
+    }
+}
+
 /// Returns whether `path` names frames with poses, by its extension.
 fn is_sequence(path: &Path) -> bool {
     ends(path, ["mha", "nrrd"])
@@ -126,13 +143,24 @@ impl Film {
         Ok(Self { shown, times, ras_from_world, reel, sidecar, frames: Vec::new() })
     }
 
-    /// Adds the last frame of the simulator, the one of this number.
+    /// Adds the last frame of the simulator, the one of this number, coloured by a packet of its own if a mode is given.
     ///
     /// # Errors
     /// An error of the device, of the format or of the file system.
-    pub fn add(&mut self, index: u32, simulator: &mut Simulator, scene: &Scene) -> Result<()> {
-        let (width, height, rgba) = simulator.pixels().into_diagnostic()?;
+    pub fn add(
+        &mut self,
+        index: u32,
+        simulator: &mut Simulator,
+        scene: &Scene,
+        mode: Option<ColourMode>,
+    ) -> Result<()> {
+        let (width, height, mut rgba) = simulator.pixels().into_diagnostic()?;
         let area = area(simulator);
+        let mut said = None;
+        if let Some(mode) = mode {
+            let (coloured, facts) = coloured(simulator, scene, mode, index, &area)?;
+            (rgba, said) = (coloured, Some(facts));
+        }
         if index == 0 {
             self.sidecar.insert("image".into(), facts::image(&area));
         }
@@ -142,12 +170,15 @@ impl Film {
         }
         frame.insert("time_s".into(), json!(self.times[index as usize]));
         frame.insert("pose".into(), facts::pose(&scene.world_from_probe));
+        let colours = said.is_some();
+        frame.extend(said.map(|facts| ("doppler".to_owned(), facts)));
         match &mut self.reel {
             Reel::Images(images) => {
                 let mut text = self.sidecar.clone();
                 text.extend(frame.clone());
                 let text = Value::Object(text).to_string();
-                let picture = grey_png([width, height], &rgba, area.pitch, Some(&text));
+                let png = if colours { colour_png } else { grey_png };
+                let picture = png([width, height], &rgba, area.pitch, Some(&text));
                 let path = images.path(index);
                 files::replace(&path, &picture)
                     .map_err(|e| miette!("writing {}: {e}", path.display()))?;

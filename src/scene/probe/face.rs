@@ -7,6 +7,19 @@ use glam::DVec3;
 use super::{Probe, ProbeKind};
 
 impl Probe {
+    /// Place of (x, z) mm of the plane of the image: across the face, -1/2 to 1/2 from its first edge to its last, and depth
+    /// along the scanline, mm.
+    pub fn across(&self, x: f64, z: f64) -> [f64; 2] {
+        let fan = |radius: f64, field_of_view: f64| {
+            [x.atan2(z + radius) / field_of_view, x.hypot(z + radius) - radius]
+        };
+        match self.kind {
+            ProbeKind::Convex { radius, field_of_view } => fan(radius, field_of_view),
+            ProbeKind::Phased { field_of_view } => fan(0.0, field_of_view),
+            ProbeKind::Linear { width } => [x / width, z],
+        }
+    }
+
     /// The sector's bounding box in probe space: left, top, right, bottom, mm. The top of a convex
     /// face is above z = 0 at its edges.
     pub fn bounds(&self) -> [f64; 4] {

@@ -11,6 +11,7 @@ mod anatomy;
 mod columns;
 mod contact;
 mod document;
+mod doppler;
 mod error;
 mod flow;
 mod fusion;
@@ -146,6 +147,7 @@ impl Scene {
         )?;
         let tracker = tracker::build(&document, &file.tracker.stated)?;
         let live = file.live.stated.get("");
+        let doppler = doppler::doppler(&document, &file.doppler.stated, &settings.probe)?;
         warnings.extend(tissues.unused());
         let name = file
             .name
@@ -172,6 +174,7 @@ impl Scene {
             contact,
             tracker,
             live,
+            doppler,
             flows: Vec::new(),
             origins,
         };

@@ -61,7 +61,7 @@ measures! {
     /// s.
     DURATION: "duration", "a duration", true, "", [("s", 1.0), ("ms", 1e-3)];
     /// Times per second, Hz.
-    RATE: "rate", "a rate", true, "", [("Hz", 1.0)];
+    RATE: "rate", "a rate", true, "", [("Hz", 1.0), ("kHz", 1000.0)];
     /// MRayl.
     IMPEDANCE: "impedance", "an impedance", true, "",
         [("MRayl", 1.0), ("kg/m2/s", 1e-6), ("Rayl", 1e-6)];

@@ -25,7 +25,8 @@ use super::tissues::TissueKeys;
 use super::tracker::{MatrixKey, TrackerKeys};
 use super::vary::VaryKeys;
 use crate::settings::{
-    Display, Form, Fusion, Imaging, Live, Probe, Processing, Simulation, Surface, Tissue, group,
+    Display, Doppler, Form, Fusion, Imaging, Live, Probe, Processing, Simulation, Surface, Tissue,
+    group,
 };
 
 group! {
@@ -174,6 +175,7 @@ tables! {
     tracker: One<TrackerKeys>, "tracker": defaults::<TrackerKeys>(""),
         defaults::<Placed>("world_from_reference."), defaults::<MatrixKey>("world_from_reference."),
         defaults::<Placed>("tool_from_probe."), defaults::<MatrixKey>("tool_from_probe.");
+    doppler: One<Doppler>, "doppler": defaults::<Doppler>("");
     live: One<Live>, "live": defaults::<Live>("");
 }
 

@@ -1,0 +1,62 @@
+//! Settings of Doppler modes: packets of pulses, the colour box, and what becomes of their echoes.
+
+use super::units::{LENGTH, LEVEL, RATE};
+use super::{group, words};
+
+words! {
+    /// What is taken off the echoes of a packet as coming from tissue: the polynomial over its pulses that fits best.
+    #[derive(Default)]
+    pub enum WallFilter {
+        /// Nothing.
+        Off = "off",
+        /// What is the same in all pulses.
+        Constant = "constant",
+        /// And what changes evenly from pulse to pulse.
+        #[default]
+        Linear = "linear",
+        /// And what changes by a parabola.
+        Quadratic = "quadratic",
+    }
+}
+
+group! {
+    /// Colour Doppler.
+    pub struct Doppler in "doppler" {
+        /// Pulses per second along one line of the box (PRF). Velocities beyond the speed of sound times this over four times the
+        /// frequency fold over.
+        prf: f64 = 4000.0,
+            Facts::quantity(&RATE, 10.0, 1e5).label("PRF").usual(500.0, 12_000.0);
+        /// Pulses of a packet, from which a velocity is found.
+        pulses: u32 = 8, Facts::whole(2, 64).label("Packet size").usual(4.0, 16.0);
+        /// What is taken off the echoes as coming from tissue: the polynomial over the pulses of a packet that fits best.
+        wall_filter: WallFilter = WallFilter::Linear, Facts::word::<WallFilter>().label("Wall filter");
+        /// Left edge of the box, over the scanlines.
+        left: f64 = 0.2, Facts::number(0.0, 1.0).label("Box, left");
+        /// Right edge.
+        right: f64 = 0.8, Facts::number(0.0, 1.0).label("Box, right");
+        /// Upper edge, over the depth.
+        top: f64 = 0.2, Facts::number(0.0, 1.0).label("Box, top");
+        /// Lower edge.
+        bottom: f64 = 0.8, Facts::number(0.0, 1.0).label("Box, bottom");
+        /// Depth over which correlations are averaged.
+        gate: f64 = 0.6, Facts::quantity(&LENGTH, 0.0, 10.0).label("Gate").usual(0.2, 3.0);
+        /// Gain of filtered echoes over that of the image: where they are brighter than black with it there is colour.
+        gain: f64 = 24.0, Facts::quantity(&LEVEL, -60.0, 90.0).label("Colour gain").usual(0.0, 50.0);
+        /// How far filtered echoes have to stand out of the noise to be coloured.
+        threshold: f64 = 6.0, Facts::quantity(&LEVEL, -60.0, 60.0).label("Threshold").usual(0.0, 20.0);
+        /// Grey level of the image, 0 to 1, from which on it stands in front of colour.
+        priority: f64 = 0.5, Facts::number(0.0, 1.0).label("Priority");
+    }
+}
+
+impl Doppler {
+    /// Highest order of the polynomial that the wall filter takes off; none: it takes nothing.
+    pub fn order(&self) -> Option<u32> {
+        match self.wall_filter {
+            WallFilter::Off => None,
+            WallFilter::Constant => Some(0),
+            WallFilter::Linear => Some(1),
+            WallFilter::Quadratic => Some(2),
+        }
+    }
+}

@@ -1,0 +1,123 @@
+//! Colour Doppler as a user sees it: pictures with colours where something flows, and mistakes explained.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+const SCENE: &str = r#"
+name = "vessel"
+background = "muscle"
+
+[probe]
+preset = "linear"
+depth = "40 mm"
+scanlines = 96
+samples = 1024
+elevation_layers = 3
+
+[imaging]
+image_height = 200
+
+[[mesh]]
+name = "vessel"
+shape = { cylinder = { radius = 5, length = 100, segments = 48 } }
+tissue = "blood"
+priority = 1
+translate = [0, 0, 20]
+rotate = { axis = [0, 1, 0], angle = "60 deg" }
+
+[[flow]]
+name = "vessel"
+mesh = "vessel"
+line = { from = [0, 0, -50], to = [0, 0, 50] }
+speed = "30 cm/s"
+"#;
+
+fn render(folder: &Path, name: &str, more: &[&str]) -> Output {
+    let scene = folder.join("vessel.toml");
+    std::fs::write(&scene, SCENE).expect("written");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_insonify"));
+    command.arg("render").arg(scene).arg("-o").arg(folder.join(name)).args(more);
+    command.output().expect("the program starts")
+}
+
+/// Numbers of pixels that are redder than blue, bluer than red, and grey.
+fn colours(file: &Path) -> [usize; 3] {
+    let picture = image::open(file).expect("a picture").to_rgb8();
+    let mut counts = [0; 3];
+    for pixel in picture.pixels() {
+        let [r, g, b] = pixel.0;
+        let which = if r > b {
+            0
+        } else if b > r {
+            1
+        } else {
+            2
+        };
+        counts[which] += 1;
+        assert!(which < 2 || r == g, "{pixel:?}");
+    }
+    counts
+}
+
+/// Downwards along the vessel is away from the probe. The box has three fifths of the image's width, through which the vessel
+/// runs all the way.
+#[test]
+fn what_flows_away_is_blue_what_comes_is_red_and_tissue_stays_grey() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    for (mode, speed, redder) in
+        [("color", "30 cm/s", false), ("color", "-30 cm/s", true), ("power", "30 cm/s", true)]
+    {
+        let out = render(
+            folder,
+            "a.png",
+            &["--mode", mode, "--set", &format!("flow.vessel.speed={speed}")],
+        );
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        let [red, blue, grey] = colours(&folder.join("a.png"));
+        let (most, least) = if redder { (red, blue) } else { (blue, red) };
+        let all = (red + blue + grey) as f64;
+        let share = most as f64 / all;
+        // 10 mm over the sine of 60 degrees of 40 mm of depth, without the slow blood at the walls.
+        let vessel = 0.6 * 10.0 / 60.0_f64.to_radians().sin() / 40.0;
+        assert!(
+            (0.5 * vessel..1.05 * vessel).contains(&share),
+            "{mode}, {speed}: {share}, {vessel}"
+        );
+        assert!((least as f64) < 0.01 * all, "{mode}, {speed}: {least} of the other colour");
+    }
+    let text = std::fs::read_to_string(folder.join("a.json")).expect("a sidecar");
+    let facts: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    let doppler = &facts["frames"][0]["doppler"];
+    assert_eq!((&doppler["shows"], &doppler["pulses"]), (&"power".into(), &8.into()));
+    // Without colours the picture is grey.
+    let out = render(folder, "b.png", &[]);
+    assert!(out.status.success());
+    assert_eq!(colours(&folder.join("b.png"))[..2], [0, 0]);
+}
+
+#[test]
+fn mistakes_in_doppler_have_a_remedy() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for (name, more, cause, remedy) in [
+        ("a.gif", vec![], "holds grey images", ".png"),
+        ("a.png", vec!["doppler.prf=30 kHz"], "take longer than", "at most 24062 Hz"),
+        ("a.png", vec!["doppler.prf=5 Hz"], "prf is 5 Hz", "between"),
+        (
+            "a.png",
+            vec!["doppler.left=0.9"],
+            "ends at 0.8, where it begins at 0.9",
+            "left before right",
+        ),
+        ("a.png", vec!["doppler.pulses=1"], "pulses is 1", "between 2 and 64"),
+        ("a.png", vec!["flow.vesel.speed=1"], "vesel", "vessel"),
+    ] {
+        let set = more.iter().flat_map(|set| ["--set", *set]);
+        let more: Vec<&str> = ["--mode", "color"].into_iter().chain(set).collect();
+        let out = render(folder.path(), name, &more);
+        let said = String::from_utf8_lossy(&out.stderr);
+        assert!(!out.status.success(), "{more:?}");
+        let flat = said.split_whitespace().filter(|w| *w != "│").collect::<Vec<_>>().join(" ");
+        assert!(flat.contains(cause) && flat.contains(remedy), "{more:?}: {said}");
+    }
+}
