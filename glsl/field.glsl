@@ -66,30 +66,6 @@ vec3 displaced(Field f, vec3 p) {
     return p + displacement(f, p, gradient);
 }
 
-// The fields by which tissue comes from where it rests to where it is now: blood is carried by its flow first, its shape times
-// a way, and then with what it is in. NONE: none.
-struct Motion { uint flow; float way; uint field; };
-
-uint motion_offset(Motion m, uint i) { return i == 0u ? m.flow : m.field; }
-
-Field motion_field(Motion m, uint i) {
-    Field f = load_field(motion_offset(m, i));
-    f.amount = i == 0u ? m.way : 1.0;
-    return f;
-}
-
-// Where the tissue that rests at p is now, and the derivative of that by p.
-vec3 moved(Motion m, vec3 p, out mat3 jacobian) {
-    jacobian = mat3(1.0);
-    for (uint i = 0u; i < 2u; ++i) {
-        if (motion_offset(m, i) == NONE) continue;
-        mat3 gradient;
-        p += displacement(motion_field(m, i), p, gradient);
-        jacobian += gradient * jacobian;
-    }
-    return p;
-}
-
 // Solves jacobian x = b; returns b where the field folds.
 vec3 undeform(mat3 jacobian, vec3 b) {
     vec3 across = cross(jacobian[1], jacobian[2]);
@@ -110,6 +86,32 @@ vec3 reference_point(Field f, vec3 p) {
     return found;
 }
 
+// The fields by which tissue comes from where it rests to where it is now: blood is carried by its flow first, its shape times
+// a way, and then with what it is in. NONE: none.
+struct Motion { uint flow; float way; uint field; };
+
+#ifdef FLOWING_TISSUE
+uint motion_offset(Motion m, uint i) { return i == 0u ? m.flow : m.field; }
+
+Field motion_field(Motion m, uint i) {
+    Field f = load_field(motion_offset(m, i));
+    f.amount = i == 0u ? m.way : 1.0;
+    return f;
+}
+
+// How far the tissue that rests at p has moved, and the derivative of its place by p.
+vec3 moved(Motion m, vec3 p, out mat3 jacobian) {
+    vec3 by = vec3(0.0);
+    jacobian = mat3(1.0);
+    for (uint i = 0u; i < 2u; ++i) {
+        if (motion_offset(m, i) == NONE) continue;
+        mat3 gradient;
+        by += displacement(motion_field(m, i), p + by, gradient);
+        jacobian += gradient * jacobian;
+    }
+    return by;
+}
+
 // Where the tissue that is at p now rests.
 vec3 rest_of(Motion m, vec3 p) {
     for (uint i = 0u; i < 2u; ++i) {
@@ -117,6 +119,16 @@ vec3 rest_of(Motion m, vec3 p) {
     }
     return p;
 }
+#else
+// The same where nothing flows.
+vec3 moved(Motion m, vec3 p, out mat3 jacobian) {
+    vec3 by = displacement(load_field(m.field), p, jacobian);
+    jacobian += mat3(1.0);
+    return by;
+}
+
+vec3 rest_of(Motion m, vec3 p) { return reference_point(load_field(m.field), p); }
+#endif
 
 // The map from the world to the reference shape, for the tissue at p.
 vec3 tissue_point(uint instance, vec3 p) {

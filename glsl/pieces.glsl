@@ -50,7 +50,7 @@ uvec3 march_piece(Stretch s, Scatterers group, int number, vec2 x, float drowned
     vec3 here = s.o + (x.x + half_length) * s.d;
     vec3 p = rest_of(group.motion, here);
     mat3 jacobian;
-    vec3 back = here - moved(group.motion, p, jacobian);
+    vec3 back = here - p - moved(group.motion, p, jacobian);
     vec3 middle = p + undeform(jacobian, back);
     float width = 1.1 * end_width(s, x);
     if (!(width > 0.0)) return uvec3(0u);
@@ -66,7 +66,8 @@ uvec3 march_piece(Stretch s, Scatterers group, int number, vec2 x, float drowned
         vec3 side = (2.0 * vec3(i & 1u, (i >> 1u) & 1u, i >> 2u) - 1.0) * half_size;
         vec3 off = side.x * d + side.y * el + side.z * ee;
         mat3 unused;
-        vec3 to = moved(group.motion, middle + off, unused) - here;
+        vec3 at = middle + off;
+        vec3 to = at + moved(group.motion, at, unused) - here;
         vec3 miss = vec3(dot(to, s.d) - dot(off, along), dot(to, s.e_l) - dot(off, across), dot(to, s.e_e) - dot(off, up));
         least = min(least, miss);
         most = max(most, miss);
@@ -125,7 +126,8 @@ uvec3 march_piece(Stretch s, Scatterers group, int number, vec2 x, float drowned
             }
             if (!found) continue;
             mat3 unused;
-            vec3 from = moved(group.motion, centre + rel, unused) - s.o;
+            vec3 rest_at = centre + rel;
+            vec3 from = rest_at + moved(group.motion, rest_at, unused) - s.o;
             if (depth > 0.0) {
                 // That of the axis beside the scatterer, as in march_planes.
                 vec3 on_axis = middle + (dot(from, s.d) - x.x - half_length) * d;
@@ -140,9 +142,9 @@ uvec3 march_piece(Stretch s, Scatterers group, int number, vec2 x, float drowned
 // Scatterers of the lattices from one number to another: of both generations where something flows, and of one for a pulse.
 uvec3 march_generations(Stretch s, ivec2 numbers, vec2 x, float drowned) {
     uvec3 count = uvec3(0u);
-    uint flow = flow_of(s.instance);
-    bool pulse = (push.part & PART_PULSE) != 0u;
     Scatterers group = Scatterers(Motion(NONE, 0.0, field_of(s.instance)), 1.0, 0u);
+    uint flow = flows(s) ? flow_of(s.instance) : 0u;
+    bool pulse = (push.part & PART_PULSE) != 0u;
     for (uint i = 0u; i < (flow == 0u || pulse ? 1u : GENERATIONS); ++i) {
         if (flow != 0u) {
             vec3 head = field_vector(flow + (pulse ? GENERATIONS : i));

@@ -1,4 +1,4 @@
-// variants: rigid deforming(DEFORMING_TISSUE)
+// variants: rigid deforming(DEFORMING_TISSUE) flowing(DEFORMING_TISSUE, FLOWING_TISSUE)
 #version 460
 // Echoes of scatterers and point targets along the segments of one scanline. A scanline hears the scatterers of its own
 // strip, which beam spreads over its neighbours, and all point targets in its beam. One workgroup owns one
@@ -29,12 +29,17 @@ layout(push_constant) uniform Push {
     float time;    // of a pulse, seconds from the frame's time
 } push;
 
-// True if any instance's tissue deforms. Two modules, as not every driver removes the code that a specialization
-// constant switches off, and the code for deformed tissue is the larger half.
+// True if any instance's tissue deforms, or something flows. Modules of their own, as not every driver removes the code that
+// a specialization constant switches off, and the code for deformed tissue is the larger half.
 #ifdef DEFORMING_TISSUE
 const bool DEFORMING = true;
 #else
 const bool DEFORMING = false;
+#endif
+#ifdef FLOWING_TISSUE
+const bool FLOWING = true;
+#else
+const bool FLOWING = false;
 #endif
 
 #include "transform.glsl"
@@ -76,12 +81,12 @@ Stretch texture_stretch(uint at) {
     return s;
 }
 
-bool deforms(Stretch s) { return DEFORMING && (field_of(s.instance) != NONE || flow_of(s.instance) != 0u); }
+bool flows(Stretch s) { return FLOWING && flow_of(s.instance) != 0u; }
+bool deforms(Stretch s) { return DEFORMING && (field_of(s.instance) != NONE || flows(s)); }
 
 // True if the dispatch hears the stretch.
 bool heard(Stretch s) {
-    bool flows = DEFORMING && flow_of(s.instance) != 0u;
-    return sounds(s) && (push.part & (flows ? PART_FLOWING : PART_STILL)) != 0u;
+    return sounds(s) && (push.part & (flows(s) ? PART_FLOWING : PART_STILL)) != 0u;
 }
 
 // Parts of a bin that are searched one by one: in deformed tissue, several.

@@ -32,6 +32,7 @@
     ("reduce", include_bytes!("reduce.spv")),
     ("refit", include_bytes!("refit.spv")),
     ("scatter_deforming", include_bytes!("scatter_deforming.spv")),
+    ("scatter_flowing", include_bytes!("scatter_flowing.spv")),
     ("scatter_rigid", include_bytes!("scatter_rigid.spv")),
     ("shadow_bvh", include_bytes!("shadow_bvh.spv")),
     ("shadow_query", include_bytes!("shadow_query.spv")),

@@ -80,6 +80,7 @@ subjects!(
     aperture,
     scatter_rigid,
     scatter_deforming,
+    scatter_flowing,
     beam,
     axial,
     detect,

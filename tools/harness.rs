@@ -298,7 +298,7 @@ impl Subject {
 }
 
 /// Every kernel of the image, in the order of a frame after the three that only tests use.
-pub const SUBJECTS: [Subject; 30] = [
+pub const SUBJECTS: [Subject; 31] = [
     angles::SUBJECT,
     geometry::SUBJECT,
     rays::SUBJECT,
@@ -309,6 +309,7 @@ pub const SUBJECTS: [Subject; 30] = [
     aperture::SUBJECT,
     scatter::RIGID,
     scatter::DEFORMING,
+    scatter::FLOWING,
     beam::SUBJECT,
     axial::SUBJECT,
     detect::SUBJECT,

@@ -38,7 +38,7 @@ impl Passes {
     /// Records the echoes of the scatterers that `push` names along the segments of the last batch.
     pub(super) fn scatter(&self, cmd: &mut Commands, push: push::Scatter) -> Result<(), GpuError> {
         cmd.scope(SCATTER.name);
-        let [threads, ..] = self.kernels.of(&SCATTER, self.world.deforms()).local_size();
+        let [threads, ..] = self.kernels.of(&SCATTER, self.world.tissue()).local_size();
         let groups = scatter::extent(self.frame(), self.batches.rounds.at_once / threads);
         self.record(cmd, &SCATTER, groups, bytemuck::bytes_of(&push), &|_| Vec::new())
     }
@@ -50,7 +50,7 @@ impl Passes {
         instead: Instead<'_>,
     ) -> Result<(), GpuError> {
         cmd.scope(APERTURE.name);
-        let [threads, ..] = self.kernels.of(&APERTURE, self.world.deforms()).local_size();
+        let [threads, ..] = self.kernels.of(&APERTURE, self.world.tissue()).local_size();
         let groups = aperture::extent(self.frame(), self.batches.rounds.at_once / threads);
         self.record(cmd, &APERTURE, groups, &[], instead)
     }

@@ -350,8 +350,8 @@ impl Simulator {
     /// True if the next frame of `scene` will wait for the driver's compiler, because its kernels have never run here.
     pub fn compiles(&self, scene: &Scene) -> bool {
         let longest = [&SCATTER].into_iter().chain(scene.simulation.labels.then_some(&LABEL));
-        let deforms = self.passes.world.deforms();
-        longest.into_iter().any(|pass| self.passes.kernels.of(pass, deforms).is_new())
+        let tissue = self.passes.world.tissue();
+        longest.into_iter().any(|pass| self.passes.kernels.of(pass, tissue).is_new())
     }
 
     /// Builds the pipelines again from `library`'s kernels, after the frames in flight.

@@ -122,7 +122,7 @@ pub enum Variants {
     Tracer,
     /// One variant per tracer, and one that counts the steps of the compute tracer.
     Counting,
-    /// One variant for rigid tissue and one for deforming tissue.
+    /// One variant for rigid tissue, one for deforming tissue, and one for tissue of which some flows.
     Tissue,
 }
 

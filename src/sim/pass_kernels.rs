@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::pass::{Pass, Variants};
 use super::shaders::Library;
-use super::world::World;
+use super::world::{TissueMotion, World};
 use crate::gpu::{Device, GpuError, Kernel};
 use crate::scene::Scene;
 
@@ -15,15 +15,19 @@ pub(super) struct PassKernels(Vec<PassKernel>);
 struct PassKernel {
     pass: &'static Pass,
     kernel: Kernel,
-    /// The variant for deforming tissue, where there is one: a mesh that a program reshapes begins to deform.
-    deforming: Option<Kernel>,
+    /// The variants for deforming and for flowing tissue, where there are some: a mesh that a program reshapes begins to deform.
+    others: Option<[Kernel; 2]>,
     /// True if the frames that the scene began with run it.
     needed: bool,
 }
 
 impl PassKernel {
-    fn of(&self, deforms: bool) -> &Kernel {
-        self.deforming.as_ref().filter(|_| deforms).unwrap_or(&self.kernel)
+    fn of(&self, tissue: TissueMotion) -> &Kernel {
+        match (&self.others, tissue) {
+            (Some([deforming, _]), TissueMotion::Deforming) => deforming,
+            (Some([_, flowing]), TissueMotion::Flowing) => flowing,
+            (None, _) | (_, TissueMotion::Rigid) => &self.kernel,
+        }
     }
 }
 
@@ -74,26 +78,26 @@ impl PassKernels {
                     suffix.map_or(pass.name.into(), |suffix| format!("{}_{suffix}", pass.name));
                 Kernel::when_needed(device, &stem, library.words(&stem), pass.constants)
             };
-            let deforming = match pass.variants {
-                Variants::Tissue => Some(kernel(Some("deforming"))?),
+            let others = match pass.variants {
+                Variants::Tissue => Some([kernel(Some("deforming"))?, kernel(Some("flowing"))?]),
                 _ => None,
             };
-            kernels.push(PassKernel { pass, kernel: kernel(suffix)?, deforming, needed });
+            kernels.push(PassKernel { pass, kernel: kernel(suffix)?, others, needed });
         }
-        let deforms = world.deforms();
+        let tissue = world.tissue();
         // The kernels that take longest to compile begin first.
         let due = kernels.iter().filter(|made| made.needed);
-        let mut due: Vec<_> = due.map(|made| made.of(deforms)).collect();
+        let mut due: Vec<_> = due.map(|made| made.of(tissue)).collect();
         due.sort_by_key(|kernel| Reverse(library.words(kernel.name()).len()));
         due.iter().for_each(|kernel| kernel.prepare());
         Ok(Self(kernels))
     }
 
-    /// The kernel of a pass, for a world whose tissue deforms or one whose tissue does not.
-    pub(super) fn of(&self, pass: &Pass, deforms: bool) -> &Kernel {
+    /// The kernel of a pass, for a world with such tissue.
+    pub(super) fn of(&self, pass: &Pass, tissue: TissueMotion) -> &Kernel {
         let is = |made: &&PassKernel| {
             made.pass.name == pass.name && made.pass.constants == pass.constants
         };
-        self.0.iter().find(is).expect("a pass of the scene").of(deforms)
+        self.0.iter().find(is).expect("a pass of the scene").of(tissue)
     }
 }

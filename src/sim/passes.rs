@@ -74,7 +74,7 @@ impl Passes {
         push: &[u8],
         instead: Instead<'_>,
     ) -> Result<(), GpuError> {
-        let kernel = self.kernels.of(pass, self.world.deforms());
+        let kernel = self.kernels.of(pass, self.world.tissue());
         // By number: what a kernel declares and does not use is not in its SPIR-V.
         let binds = kernel.bindings().iter().map(|info| pass.binds[info.binding as usize]);
         let binds: Vec<&Array> = binds.collect();

@@ -47,6 +47,17 @@ pub enum WorldError {
     Selector(String),
 }
 
+/// What the tissue of a world does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TissueMotion {
+    /// It moves as rigid bodies.
+    Rigid,
+    /// That of some instances deforms.
+    Deforming,
+    /// In some instances it flows, in others it may deform.
+    Flowing,
+}
+
 /// The anatomy on the device.
 pub struct World {
     tracer: Tracer,
@@ -354,9 +365,13 @@ impl World {
         buffer.map(Binding::Buffer)
     }
 
-    /// True if the tissue of any instance deforms, or blood flows in it.
-    pub fn deforms(&self) -> bool {
-        !self.fields.is_empty()
+    /// What its tissue does.
+    pub fn tissue(&self) -> TissueMotion {
+        match (self.flows.is_empty(), self.fields.is_empty()) {
+            (false, _) => TissueMotion::Flowing,
+            (true, false) => TissueMotion::Deforming,
+            (true, true) => TissueMotion::Rigid,
+        }
     }
 
     /// The binding of `nodes` or `tlas` for kernels of this world's tracer.

@@ -12,8 +12,15 @@ use insonify::sim::{push, stages};
 /// Samples beyond the first window, in one case; no multiple of a bin or a slot.
 const BEYOND: u32 = 211;
 
+/// The kernel for worlds in which something flows.
+pub const FLOWING: Subject = Subject { name: "scatter_flowing", job, ..RIGID };
+
 /// The kernel for worlds with deforming tissue.
-pub const DEFORMING: Subject = Subject { name: "scatter_deforming", job, ..RIGID };
+pub const DEFORMING: Subject = Subject {
+    name: "scatter_deforming",
+    job: |case, size| job_of(stiff(scene(case, size), |i| i.flow = 0), case),
+    ..RIGID
+};
 
 /// The kernel for worlds without deforming tissue.
 pub const RIGID: Subject = Subject {
@@ -22,7 +29,9 @@ pub const RIGID: Subject = Subject {
                 a scatterer at the edge of the beam may count or not, and one of those at the ends of the \
                 slab, which are 3.2e-5 mm of its height; in voxel mode 3 %, since 1e-4 \
                 of the samples fall on the other side of a voxel's face",
-    job: |case, size| job_of(stiff(scene(case, size)), case),
+    job: |case, size| {
+        job_of(stiff(scene(case, size), |i| (i.field, i.flow) = (layout::NONE, 0)), case)
+    },
     // As for a device that would be idle: several groups share a scanline.
     extent: Some(|job| Extent::Once(stages::scatter::extent(&job.one("frame"), u32::MAX))),
     check,
@@ -81,10 +90,10 @@ pub(super) fn scene(case: Case, size: Size) -> Job {
     job
 }
 
-/// The same world where nothing deforms or flows.
-fn stiff(mut job: Job) -> Job {
+/// The same world without what `still` takes from its instances.
+fn stiff(mut job: Job, still: impl Fn(&mut layout::Instance)) -> Job {
     let mut instances: Vec<layout::Instance> = job.get("instances");
-    instances.iter_mut().for_each(|i| (i.field, i.flow) = (layout::NONE, 0));
+    instances.iter_mut().for_each(still);
     let at = job.index("instances");
     job.inputs[at] = Input::words("instances", &instances);
     job
