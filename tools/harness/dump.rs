@@ -37,7 +37,8 @@ pub fn write(dir: &Path, job: &Job, contents: &[Vec<u8>]) -> std::io::Result<()>
 /// A sentence on an array that cannot be read or is too small for the frame.
 pub fn read(dir: &Path, subject: &Subject, job: &mut Job) -> Result<Vec<&'static str>, String> {
     let kernels = dir.join(insonify::sim::dump::KERNELS);
-    let dir = if kernels.is_dir() { &kernels } else { dir };
+    let is_frame = kernels.is_dir();
+    let dir = if is_frame { &kernels } else { dir };
     let load = |name: &str| {
         let path = dir.join(format!("{name}.npy"));
         path.exists().then(|| npy::read(&path)).transpose()
@@ -49,9 +50,11 @@ pub fn read(dir: &Path, subject: &Subject, job: &mut Job) -> Result<Vec<&'static
             found.push(input.name);
         }
     }
-    // A dump of a frame has those of `trace`, of which it has every binding.
+    // A dump of a frame has those of `trace`.
     let reads = job.inputs.iter().filter(|i| i.role == Role::Read).count();
+    let are_own = !is_frame || subject.name == "trace";
     if !job.push.is_empty()
+        && are_own
         && found.len() == reads
         && let Some(bytes) = load("push")?
         && bytes.len() == job.push.len()
