@@ -90,6 +90,17 @@ fn what_flows_away_is_blue_what_comes_is_red_and_tissue_stays_grey() {
     let facts: serde_json::Value = serde_json::from_str(&text).expect("JSON");
     let doppler = &facts["frames"][0]["doppler"];
     assert_eq!((&doppler["shows"], &doppler["pulses"]), (&"power".into(), &8.into()));
+    // The packet, whose parts are as large as the box.
+    let file = folder.join("packet.npz");
+    let file = file.to_str().expect("plain");
+    let out = render(folder, "c.png", &["--mode", "color", "--packet", file]);
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let archive = std::fs::File::open(file).expect("written");
+    let mut archive = zip::ZipArchive::new(archive).expect("an archive");
+    let mut size = |name: &str| archive.by_name(name).expect(name).size();
+    let [lines, samples] = [58, 614];
+    assert_eq!(size("velocity.npy"), 128 + 4 * lines * samples);
+    assert_eq!(size("iq.npy"), 128 + 8 * 8 * lines * samples);
     // Without colours the picture is grey.
     let out = render(folder, "b.png", &[]);
     assert!(out.status.success());
@@ -109,6 +120,14 @@ fn mistakes_in_doppler_have_a_remedy() {
             "ends at 0.8, where it begins at 0.9",
             "left before right",
         ),
+        (
+            "a.png",
+            vec!["doppler.pulses=3", "doppler.wall_filter=quadratic"],
+            "takes off all",
+            "more than 3",
+        ),
+        // The default, of a box that nobody has drawn: as deep as the image lets it be.
+        ("a.png", vec!["probe.depth=290 mm"], "take longer than", "at most 3319 Hz"),
         ("a.png", vec!["doppler.pulses=1"], "pulses is 1", "between 2 and 64"),
         ("a.png", vec!["flow.vesel.speed=1"], "vesel", "vessel"),
     ] {

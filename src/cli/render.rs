@@ -70,8 +70,13 @@ pub struct Render {
     labels: Option<PathBuf>,
     /// Colours the image by a packet of pulses in the colour box of the scene's [doppler]: `color` shows velocities, red towards
     /// the probe and blue away from it, `power` how much moves. PNG only.
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, conflicts_with = "dump")]
     mode: Option<ColourMode>,
+    /// Writes the packet of the last frame of --mode: `iq` (pulse, scanline, sample; real and imaginary), `times` (s), `depth`
+    /// (mm), and what was found, `velocity` (mm/s, towards the probe), `variance`, `power` (scanline, sample); packet.json says
+    /// frequency, speed of sound and PRF. NAME.npz
+    #[arg(long, value_name = "FILE", requires = "mode")]
+    packet: Option<PathBuf>,
     /// Writes every stage as a numbered array with its axes into this folder.
     #[arg(long, value_name = "DIR")]
     dump: Option<PathBuf>,
@@ -107,6 +112,10 @@ pub fn run(args: &Render) -> Result<()> {
     film::check(&output, frames)?;
     if args.mode.is_some() {
         film::check_colour(&output)?;
+        coloured::check(&scene)?;
+        if let Some(packet) = &args.packet {
+            coloured::check_packet(packet)?;
+        }
     }
     if let Some(labels) = &args.labels {
         labels::check(labels, frames, &scene)?;
@@ -187,6 +196,7 @@ fn distinct(args: &Render, output: &Path) -> Result<()> {
             ("-o", Some(output)),
             ("--json", args.json.as_deref()),
             ("--labels", args.labels.as_deref()),
+            ("--packet", args.packet.as_deref()),
         ],
     )
 }
@@ -326,7 +336,9 @@ fn simulate(
             if let Some(labels) = &labels {
                 labels.add(index as u32, simulator, scene)?;
             }
-            film.add(index as u32, simulator, scene, args.mode)?;
+            let last = index + 1 == moments.len();
+            let packet = args.packet.as_deref().filter(|_| last);
+            film.add(index as u32, simulator, scene, args.mode.map(|mode| (mode, packet)))?;
             progress.done(index as u32 + 1);
         }
         let took = simulator.wait().into_diagnostic()?.pop().unwrap_or_default();

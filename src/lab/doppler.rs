@@ -6,6 +6,7 @@ use std::f64::consts::PI;
 use std::ops::Range;
 
 use crate::probe::Probe;
+use crate::scene::Scene;
 use crate::settings::Doppler;
 use crate::sim::Packet;
 
@@ -55,6 +56,15 @@ pub fn packet(probe: &Probe, doppler: &Doppler) -> Packet {
     let lines = span(doppler.left, doppler.right, probe.scanlines);
     let samples = span(doppler.top, doppler.bottom, probe.samples);
     Packet::even(doppler.pulses, doppler.prf, lines, samples)
+}
+
+/// The correlations of a packet's echoes behind the wall filter, by scanline and sample, as the scene's settings say.
+pub fn process(scene: &Scene, packet: &Packet, echoes: &[[f32; 2]]) -> Vec<Correlation> {
+    let (doppler, pulses) = (&scene.doppler, packet.times.len());
+    let mut filtered = echoes.to_vec();
+    wall_filter(&mut filtered, pulses, doppler.order());
+    let gate = (doppler.gate / scene.probe.sample_pitch()).round() as usize;
+    correlations(&filtered, pulses, packet.samples.len(), gate)
 }
 
 /// Orthonormal polynomials over `count` pulses up to this order: what a wall filter takes off.

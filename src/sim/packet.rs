@@ -52,7 +52,8 @@ impl Packet {
 impl Simulator {
     /// The echoes of a packet of pulses: complex baseband by pulse, scanline and sample, as [`Self::iq`] has it of an image.
     /// Tissue is as at the scene's time; what flows is carried on from there at its present speed. Noise differs from pulse
-    /// to pulse; `index` selects it. Costs a frame of these scanlines, and for each pulse what flows there.
+    /// to pulse; `index` selects it. Costs a frame of these scanlines, and for each pulse what flows there. Results of the last
+    /// image but its pixels are those of the packet's last pulse then.
     ///
     /// # Errors
     /// Those of [`Self::frame`]; device out of memory.

@@ -1,36 +1,117 @@
-//! Doppler modes: the image with the colours of its packet.
+//! Doppler modes: the image with the colours of its packet, and the packet as a file.
 
-use miette::{IntoDiagnostic, Result};
+use std::path::Path;
+
+use miette::{IntoDiagnostic, Result, miette};
 use serde_json::{Value, json};
 
-use insonify::doppler::{self, ColourMode};
+use crate::cli::common;
+use insonify::doppler::{self, ColourMode, Correlation};
+use insonify::output::npy::Element;
+use insonify::output::npz::{self, Entry};
 use insonify::scene::Scene;
-use insonify::sim::Simulator;
 use insonify::sim::facts::Area;
+use insonify::sim::{Packet, Simulator};
 
-/// The last image of the simulator in colour, RGBA, and what is said of it. The simulator holds its packet then.
+/// Refuses settings with which nothing could be coloured.
+///
+/// # Errors
+/// What is wrong with them, and the remedy.
+pub fn check(scene: &Scene) -> Result<()> {
+    match scene.doppler.fault(&scene.probe) {
+        None => Ok(()),
+        Some((key, message, remedy)) => Err(miette!(help = remedy, "doppler.{key}: {message}")),
+    }
+}
+
+/// Refuses a file that could not be written as a packet; makes its folder.
+///
+/// # Errors
+/// An extension of another format; a folder that cannot be made or written to.
+pub fn check_packet(file: &Path) -> Result<()> {
+    if file.extension().is_none_or(|e| !e.eq_ignore_ascii_case("npz")) {
+        return Err(miette!(
+            help = "end the name in .npz",
+            "{} is not written: a packet is an archive of NumPy arrays",
+            file.display()
+        ));
+    }
+    common::writable(file)
+}
+
+/// The last image of the simulator in colour, RGBA, and what is said of it. The packet goes into `file`, where one is given.
+/// The simulator holds the packet then.
 pub fn coloured(
     simulator: &mut Simulator,
     scene: &Scene,
     mode: ColourMode,
     index: u32,
     area: &Area,
+    file: Option<&Path>,
 ) -> Result<(Vec<u8>, Value)> {
     let (_, _, mut rgba) = simulator.pixels().into_diagnostic()?;
     let packet = doppler::packet(&scene.probe, &scene.doppler);
     let echoes = simulator.packet(scene, index, &packet).into_diagnostic()?;
-    doppler::colour(scene, mode, &packet, echoes, area, &mut rgba);
-    let words = match mode {
-        ColourMode::Color => "velocity",
-        ColourMode::Power => "power",
-    };
+    let found = doppler::process(scene, &packet, &echoes);
+    doppler::colour(scene, mode, &packet, &found, area, &mut rgba);
     let said = json!({
-        "shows": words,
+        "shows": match mode {
+            ColourMode::Color => "velocity",
+            ColourMode::Power => "power",
+        },
         "prf_hz": scene.doppler.prf,
         "pulses": packet.times.len(),
         "nyquist_mm_per_s": doppler::nyquist(&scene.probe, scene.doppler.prf),
         "scanlines": [packet.lines.start, packet.lines.end],
         "samples": [packet.samples.start, packet.samples.end],
+        "wall_filter": scene.doppler.wall_filter.to_string(),
+        "frequency_mhz": scene.probe.frequency,
+        "speed_mm_per_us": scene.probe.speed,
     });
+    if let Some(file) = file {
+        write(file, scene, &packet, &echoes, &found, &said)
+            .map_err(|e| miette!("writing {}: {e}", file.display()))?;
+    }
     Ok((rgba, said))
+}
+
+/// Writes the echoes of a packet, and what was found in them.
+fn write(
+    file: &Path,
+    scene: &Scene,
+    packet: &Packet,
+    echoes: &[[f32; 2]],
+    found: &[Correlation],
+    said: &Value,
+) -> std::io::Result<()> {
+    let nyquist = doppler::nyquist(&scene.probe, scene.doppler.prf);
+    let of = |value: &dyn Fn(&Correlation) -> f64| -> Vec<f32> {
+        found.iter().map(|one| value(one) as f32).collect()
+    };
+    let velocity = of(&|one| one.velocity(nyquist));
+    let variance = of(&|one| one.variance(nyquist));
+    let power = of(&|one| one.power);
+    let times: Vec<f32> = packet.times.iter().map(|&t| t as f32).collect();
+    let pitch = scene.probe.sample_pitch();
+    let depth: Vec<f32> = packet.samples.clone().map(|k| (f64::from(k) * pitch) as f32).collect();
+    let map = [packet.lines.len(), packet.samples.len()];
+    let all = [times.len(), map[0], map[1], 2];
+    let entry = |name: &str, shape, bytes| Entry {
+        name: name.to_owned(),
+        element: Element::Float,
+        shape,
+        bytes,
+    };
+    npz::write(
+        file,
+        &[
+            entry("iq", &all, bytemuck::cast_slice(echoes)),
+            entry("velocity", &map, bytemuck::cast_slice(&velocity)),
+            entry("variance", &map, bytemuck::cast_slice(&variance)),
+            entry("power", &map, bytemuck::cast_slice(&power)),
+            entry("times", &[times.len()], bytemuck::cast_slice(&times)),
+            entry("depth", &[depth.len()], bytemuck::cast_slice(&depth)),
+        ],
+        &[("packet.json", &said.to_string())],
+    )
 }

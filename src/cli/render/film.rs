@@ -143,7 +143,8 @@ impl Film {
         Ok(Self { shown, times, ras_from_world, reel, sidecar, frames: Vec::new() })
     }
 
-    /// Adds the last frame of the simulator, the one of this number, coloured by a packet of its own if a mode is given.
+    /// Adds the last frame of the simulator, the one of this number, coloured by a packet of its own if a mode is given; the packet is
+    /// written to the file beside the mode.
     ///
     /// # Errors
     /// An error of the device, of the format or of the file system.
@@ -152,13 +153,13 @@ impl Film {
         index: u32,
         simulator: &mut Simulator,
         scene: &Scene,
-        mode: Option<ColourMode>,
+        coloured_by: Option<(ColourMode, Option<&Path>)>,
     ) -> Result<()> {
         let (width, height, mut rgba) = simulator.pixels().into_diagnostic()?;
         let area = area(simulator);
         let mut said = None;
-        if let Some(mode) = mode {
-            let (coloured, facts) = coloured(simulator, scene, mode, index, &area)?;
+        if let Some((mode, packet)) = coloured_by {
+            let (coloured, facts) = coloured(simulator, scene, mode, index, &area, packet)?;
             (rgba, said) = (coloured, Some(facts));
         }
         if index == 0 {

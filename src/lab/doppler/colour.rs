@@ -1,6 +1,6 @@
 //! Colour over the grey image: velocities or power of a packet's box, scan-converted.
 
-use super::{Correlation, correlations, wall_filter};
+use super::Correlation;
 use crate::probe::Probe;
 use crate::scene::Scene;
 use crate::sim::Packet;
@@ -19,23 +19,20 @@ pub enum ColourMode {
 /// Grey of the box's outline.
 const OUTLINE: [u8; 3] = [150; 3];
 
-/// Colours the picture of a scene, RGBA bytes, where the echoes of the packet of its colour box say that something moves.
+/// Colours the picture of a scene, RGBA bytes, where what was found in the packet of its colour box ([`super::process`]) says
+/// that something moves.
 pub fn colour(
     scene: &Scene,
     mode: ColourMode,
     packet: &Packet,
-    mut echoes: Vec<[f32; 2]>,
+    found: &[Correlation],
     area: &Area,
     rgba: &mut [u8],
 ) {
     let (doppler, probe) = (&scene.doppler, &scene.probe);
     let pulses = packet.times.len();
-    wall_filter(&mut echoes, pulses, doppler.order());
-    let gate = (doppler.gate / probe.sample_pitch()).round() as usize;
-    let samples = packet.samples.len();
-    let found = correlations(&echoes, pulses, samples, gate);
     let calibration = Calibration::new(scene);
-    let map = Map { packet, found: &found };
+    let map = Map { packet, found };
     // What the wall filter leaves of the noise.
     let left = 1.0 - doppler.order().map_or(0.0, |order| f64::from(order) + 1.0) / pulses as f64;
     let noise = calibration.noise_level() + 10.0 * left.max(0.0).log10();

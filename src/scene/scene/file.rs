@@ -181,6 +181,7 @@ impl Scene {
         scene.place_model(placing::placement(&file.model.stated, ""));
         anatomy::countable(&document, &scene.wires)?;
         scene.flows = flow::build(&document, &file.flow, &scene)?;
+        warnings.extend(flow::standing(&document, &scene));
         scene.set_time(0.0);
         scene.tasks =
             tasks::build(&document, &file.task, &scene.poses, &scene.meshes, &scene.instances)?;

@@ -1,7 +1,7 @@
 //! Settings of Doppler modes: packets of pulses, the colour box, and what becomes of their echoes.
 
 use super::units::{LENGTH, LEVEL, RATE};
-use super::{group, words};
+use super::{Probe, group, words};
 
 words! {
     /// What is taken off the echoes of a packet as coming from tissue: the polynomial over its pulses that fits best.
@@ -50,6 +50,39 @@ group! {
 }
 
 impl Doppler {
+    /// What is wrong with these settings for a probe: the key at fault, the cause, and the remedy. None where they fit.
+    pub fn fault(&self, probe: &Probe) -> Option<(&'static str, String, String)> {
+        for (low, high, key) in
+            [(self.left, self.right, "right"), (self.top, self.bottom, "bottom")]
+        {
+            if low >= high {
+                let message = format!("the colour box ends at {high}, where it begins at {low}");
+                let remedy = "give edges in order: left before right, top before bottom";
+                return Some((key, message, remedy.to_owned()));
+            }
+        }
+        // Echoes of one pulse have to come back before the next is sent.
+        let deepest = self.bottom * probe.depth;
+        let most = probe.speed * 1e6 / (2.0 * deepest);
+        if self.prf > most {
+            let message = format!(
+                "echoes from the box's lower edge, {deepest:.0} mm deep, take longer than from one of {:.0} pulses a second to the next",
+                self.prf
+            );
+            let remedy = format!("at most {most:.0} Hz: lower `prf`, or raise the box (`bottom`)");
+            return Some(("prf", message, remedy));
+        }
+        let taken = self.order().map_or(0, |order| order + 1);
+        if taken >= self.pulses {
+            let message = format!(
+                "the {} wall filter takes off all that {} pulses can have",
+                self.wall_filter, self.pulses
+            );
+            return Some(("pulses", message, format!("take more than {taken}, or a lower filter")));
+        }
+        None
+    }
+
     /// Highest order of the polynomial that the wall filter takes off; none: it takes nothing.
     pub fn order(&self) -> Option<u32> {
         match self.wall_filter {

@@ -4,11 +4,13 @@ use std::path::Path;
 use std::sync::Arc;
 
 use bytemuck::Zeroable;
+use glam::DVec3;
 
 use super::{RayHit, Trial, agree, id, tried};
 use crate::gpu::test_device;
 use crate::layout::NONE;
-use crate::scene::Scene;
+use crate::scene::flow::{Course, FlowShape};
+use crate::scene::{Flow, Scene};
 use crate::shaders::Library;
 use crate::skip::{Lacking, skip};
 
@@ -32,6 +34,11 @@ fn the_ray_query_finds_the_surfaces_of_a_scene() {
     let trial = Trial::run(&device, &library, &scene).unwrap();
     assert!(trial.rays > 3000, "{trial:?}");
     assert_eq!(device.validation_messages(), [""; 0]);
+    // What flows meets the same surfaces.
+    let mut flowing = scene.clone();
+    let shape = FlowShape::Uniform(DVec3::X);
+    flowing.flows = vec![Flow::new("flow".into(), 0, shape, 100.0, Course::Steady)];
+    assert_eq!(Trial::run(&device, &library, &flowing).unwrap(), trial);
     let verdict = tried(&device, &library, &scene);
     assert_eq!(verdict.is_ok(), trial.passed(), "{trial:?}");
     if let Err(why) = verdict {

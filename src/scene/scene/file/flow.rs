@@ -12,9 +12,9 @@ use super::placing::PLACE;
 use super::table::{Stated, Table};
 use crate::scene::animation::Clock;
 use crate::scene::flow::{CentreLine, Course, Flow, FlowShape};
-use crate::scene::{Instance, Mesh, Scene};
+use crate::scene::{Instance, Mesh, Scene, Warning};
 use crate::settings::units::{LENGTH, VELOCITY};
-use crate::settings::{Form, group, suggest, words};
+use crate::settings::{Form, ScatterMode, TextureSpace, group, suggest, words};
 
 /// Fastest flow, mm/s: jets of the tightest valves have 6 to 7 m/s.
 const FASTEST: f64 = 20_000.0;
@@ -109,6 +109,21 @@ pub(super) fn build(
         flows.push(flow);
     }
     Ok(flows)
+}
+
+/// The warning of settings with which nothing flows, though a flow is there.
+pub(super) fn standing(document: &Document<'_>, scene: &Scene) -> Option<Warning> {
+    let simulation = &scene.simulation;
+    let key = match (simulation.scatter_mode, simulation.texture_space) {
+        _ if scene.flows.is_empty() => return None,
+        (ScatterMode::Voxel, _) => "scatter_mode",
+        (ScatterMode::Lattice, TextureSpace::Tissue) => return None,
+        (ScatterMode::Lattice, _) => "texture_space",
+    };
+    let message = "with this blood stands still, though the scene has a [[flow]]";
+    let at = document.fail(&format!("simulation.{key}"), message, "remove it, or the flow");
+    let warning = Warning::warning(&at.file, 1, at.message, at.remedy.unwrap_or_default());
+    Some(warning.of(&format!("line {}", at.line)))
 }
 
 /// A table with its place.

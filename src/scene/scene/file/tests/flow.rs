@@ -60,6 +60,24 @@ fn files_give_centre_lines_and_waveforms() {
 }
 
 #[test]
+fn settings_with_which_blood_stands_still_are_warned_of() {
+    let case = Case::new();
+    for (setting, warned) in [
+        ("scatter_mode = \"voxel\"", 1),
+        ("texture_space = \"world\"", 1),
+        ("scatter_mode = \"lattice\"", 0),
+    ] {
+        let text = format!("{}[simulation]\n{setting}\n", flow(STRAIGHT));
+        let (_, warnings) = case.load(&text, &[]).expect("a scene");
+        let still = warnings.iter().filter(|w| w.message.contains("blood stands still"));
+        assert_eq!(still.count(), warned, "{setting}: {warnings:?}");
+    }
+    let (_, warnings) =
+        case.load(&vessel("[simulation]\nscatter_mode = \"voxel\"\n"), &[]).expect("a scene");
+    assert!(!warnings.iter().any(|w| w.message.contains("blood")), "{warnings:?}");
+}
+
+#[test]
 fn mistakes_of_flows_are_placed() {
     let case = Case::new();
     // Line of the first key of the table, less 1.
