@@ -12,6 +12,12 @@ fn ends(points: impl Iterator<Item = DVec3>) -> (DVec3, DVec3) {
     ends.unwrap_or_default()
 }
 
+/// Cells of an edge of `spacing` that hold `extent`, per axis, with one to spare on each side. Rounded up: the centre stays
+/// where it is.
+fn cells(extent: DVec3, spacing: f64) -> DVec3 {
+    (extent / spacing - 1e-9).ceil().max(DVec3::ONE) + 2.0
+}
+
 /// Nodes at `origin + spacing * (i, j, k)`, mm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grid {
@@ -29,9 +35,7 @@ impl Grid {
         let (low, high) = ends(points);
         let extent = high - low;
         let spacing = (extent.max_element() / (LONGEST_AXIS_NODES - 3.0)).max(1e-3);
-        // Rounded up: the centre stays where it is.
-        let cells = (extent / spacing - 1e-9).ceil().max(DVec3::ONE) + 2.0;
-        Self { origin: (low + high - cells * spacing) / 2.0, spacing, size: cells.as_uvec3() + 1 }
+        Self::of_cells(cells(extent, spacing), low + high, spacing)
     }
 
     /// The grid around `points` with one cell to spare on each side, of this spacing, or of as many nodes as `most`.
@@ -39,15 +43,17 @@ impl Grid {
         let (low, high) = ends(points);
         let extent = high - low;
         let mut spacing = spacing.max(1e-3);
-        loop {
-            let cells = (extent / spacing - 1e-9).ceil().max(DVec3::ONE) + 2.0;
-            // Compared as floats: a count of nodes may be beyond every integer.
-            if (cells + 1.0).element_product() <= most as f64 {
-                let origin = (low + high - cells * spacing) / 2.0;
-                return Self { origin, spacing, size: cells.as_uvec3() + 1 };
-            }
+        // Compared as floats: a count of nodes may be beyond every integer.
+        while (cells(extent, spacing) + 1.0).element_product() > most as f64 {
             spacing *= 1.1;
         }
+        Self::of_cells(cells(extent, spacing), low + high, spacing)
+    }
+
+    /// The grid of this many cells around a centre, given twice as large.
+    fn of_cells(cells: DVec3, centre_twice: DVec3, spacing: f64) -> Self {
+        let origin = (centre_twice - cells * spacing) / 2.0;
+        Self { origin, spacing, size: cells.as_uvec3() + 1 }
     }
 
     /// One cell, a cube, around `points`: enough for an affine map.
