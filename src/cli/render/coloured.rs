@@ -16,7 +16,7 @@ use insonify::sim::{Packet, Simulator};
 /// Refuses settings with which nothing could be coloured.
 ///
 /// # Errors
-/// What is wrong with them, and the remedy.
+/// The fault with its remedy, if these settings cannot colour an image of this probe.
 pub fn check(scene: &Scene) -> Result<()> {
     match scene.doppler.fault(&scene.probe) {
         None => Ok(()),

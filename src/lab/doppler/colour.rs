@@ -7,7 +7,7 @@ use crate::sim::Packet;
 use crate::sim::calibration::Calibration;
 use crate::sim::facts::Area;
 
-/// What the colours say.
+/// Quantity that the colours of an image show.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum ColourMode {
     /// Velocity: red towards the probe, blue away from it, the brighter the faster.

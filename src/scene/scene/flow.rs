@@ -29,7 +29,7 @@ pub struct Flow {
     pub name: String,
     /// Index into [`Scene::instances`](super::Scene::instances).
     pub instance: usize,
-    /// How the speed is spread over the mesh.
+    /// Shape of the flow: the way its speed is spread over the mesh.
     pub shape: FlowShape,
     /// Speed, mm/s, where shape and course are 1.
     pub speed: f64,
@@ -39,7 +39,7 @@ pub struct Flow {
     pub(super) seconds: f64,
 }
 
-/// How a speed is spread over a mesh, in the mesh's own space.
+/// Shape of a flow: the way its speed is spread over a mesh, in the mesh's own space.
 #[derive(Clone, Debug, PartialEq)]
 pub enum FlowShape {
     /// Alike everywhere, in this direction.

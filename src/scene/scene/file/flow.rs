@@ -20,7 +20,7 @@ use crate::settings::{Form, ScatterMode, TextureSpace, group, suggest, words};
 const FASTEST: f64 = 20_000.0;
 
 words! {
-    /// How the speed is spread over a mesh.
+    /// Shape of a flow: the way its speed is spread over a mesh.
     pub enum FlowKind {
         /// Along a tube, fastest in its middle.
         Tube = "tube",
@@ -36,7 +36,7 @@ group! {
         name: String = String::new(), Facts::of(Form::Text).required().limits("not empty, once in the file");
         /// The mesh in which it flows.
         mesh: String = String::new(), Facts::of(Form::Text).required();
-        /// How the speed is spread over the mesh: along a tube, fastest in its middle; or alike everywhere.
+        /// Shape of the flow: along a tube, fastest in its middle; or alike everywhere.
         kind: FlowKind = FlowKind::Tube, Facts::word::<FlowKind>();
         /// Speed where it is fastest: in the middle of the tube, at the height of the waveform. Below zero: the other way.
         speed: f64 = 0.0, Facts::quantity(&VELOCITY, -FASTEST, FASTEST).required();
