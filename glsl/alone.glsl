@@ -1,4 +1,5 @@
-// Samples of a scanline that are heard: all of them, but where one line is made alone, those over which `beam` smooths it.
+// Samples of a scanline that are heard: those of the frame; where one line is made alone, those over which
+// `beam` smooths it.
 // Part of scatter.comp; all threads of a work group take part.
 
 #include "smooth.glsl"
@@ -9,8 +10,8 @@ shared int last_heard;
 // By one thread, before a barrier.
 void begin_heard() {
     bool alone = (frame.flags & FLAG_LINE) != 0u;
-    first_heard = alone ? int(frame.samples) : 0;
-    last_heard = alone ? -1 : int(frame.samples);
+    first_heard = int(alone ? frame.samples : frame.first_sample);
+    last_heard = alone ? -1 : int(frame.end_sample);
 }
 
 // By all threads, between two barriers.

@@ -21,9 +21,9 @@ const float DECIBEL_PER_OCTAVE = 6.020599913; // 20 log10(2)
 // and scatterer echoes.
 void main() {
     int samples = int(frame.samples);
-    int first = int(gl_GlobalInvocationID.x) * AXIAL_SAMPLES;
-    uint l = gl_GlobalInvocationID.y;
-    if (first >= samples || l >= frame.scanlines) { return; }
+    int first = int(frame.first_sample + gl_GlobalInvocationID.x * uint(AXIAL_SAMPLES));
+    uint l = frame.beam_first + gl_GlobalInvocationID.y;
+    if (first >= samples || l >= frame.beam_first + frame.beam_lines) { return; }
     int line = int(l) * samples;
 
     float sigma = frame.axial_sigma;

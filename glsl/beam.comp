@@ -30,8 +30,8 @@ bool saturated(ivec2 v) { return any(greaterThanEqual(v, ivec2(HEADROOM))) || an
 #include "smooth.glsl"
 
 void main() {
-    uint k = gl_GlobalInvocationID.x;
-    int first = int(gl_WorkGroupID.y) * BEAM_LINES;
+    uint k = frame.first_sample + gl_GlobalInvocationID.x;
+    int first = int(frame.beam_first) + int(gl_WorkGroupID.y) * BEAM_LINES;
     int samples = int(frame.samples);
     int scanlines = int(frame.scanlines);
     if (k >= frame.samples) { return; }
@@ -84,7 +84,7 @@ void main() {
     float reach = rows[k].receive_reach;
     for (int n = 0; n < BEAM_LINES; ++n) {
         uint l = uint(first + n);
-        if (l >= frame.scanlines) { break; }
+        if (l >= frame.beam_first + frame.beam_lines) { break; }
         uint own = l * frame.samples + k;
         // Speckle adds in power, surface echoes add in amplitude; each is normalised to keep its level at the edges.
         vec2 scatterers = v[n] * sqrt(energy_full / energies[n]);

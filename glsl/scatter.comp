@@ -341,8 +341,10 @@ ivec2 work_of(Stretch s, bool voxel) {
     }
     ivec2 passed = bins_of(s);
     int window = int(window_begin / SCATTER_BIN);
-    int first = max(passed.x, max(window, first_heard / int(SCATTER_BIN)) - BESIDE);
-    int last = min(passed.y, min(window + int(BINS) - 1, last_heard / int(SCATTER_BIN)) + BESIDE);
+    // In deformed tissue a bin has the scatterers that lie in it, and only those nearest to its end echo in the next one.
+    ivec2 beside = mix(ivec2(BESIDE), ivec2(1, 0), bvec2(deforms(s)));
+    int first = max(passed.x, max(window, first_heard / int(SCATTER_BIN)) - beside.x);
+    int last = min(passed.y, min(window + int(BINS) - 1, last_heard / int(SCATTER_BIN)) + beside.y);
     int items = int(items_of(s));
     return ivec2(first * items, max(last - first + 1, 0) * items);
 }
@@ -353,7 +355,7 @@ void main() {
     window_begin = gl_WorkGroupID.z * SCATTER_WINDOW;
     bool voxel = (frame.flags & FLAG_VOXEL) != 0u;
     uint chunks = gl_NumWorkGroups.y;
-    if (!echoes_wanted(scanline)) return;
+    if (!echoes_wanted(scanline) || window_begin + SCATTER_WINDOW <= frame.first_sample) return;
 
     for (uint i = thread; i < 2u * SCATTER_WINDOW; i += THREADS) echoes[i] = 0;
     for (uint i = thread; i < (BINS + 2u * uint(BESIDE)) * SLOTS; i += THREADS) loudest[i] = SILENT;

@@ -137,6 +137,8 @@ struct Frame {
     uint first_line; uint lines_beside;   // number on the face of the first scanline made; scanlines of the face not made
     uint echo_first; uint echo_lines;     // of those made, the ones that echo: the others say only what sound loses there
     uint piece;                           // samples of a bin for which deformed tissue is searched together
+    uint first_sample; uint end_sample;   // the first one that is heard, and the one behind the last; all in images
+    uint beam_first; uint beam_lines;     // of those that echo, the ones that are smoothed and detected; all in images
     uint unused0;
 };
 

@@ -34,6 +34,7 @@ mod series;
 mod shipped;
 mod shots;
 mod skipping;
+mod spectrum;
 mod tasks;
 mod texture;
 mod view3d;

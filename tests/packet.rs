@@ -62,7 +62,8 @@ fn pulses_are_the_images_of_their_times() {
         // In one batch, and with segments for each path.
         for paths in [1, 3] {
             let mut scene = scene(paths);
-            let packet = Packet { times: vec![0.0, 4e-4, -3e-4], lines: 7..31, samples: 100..480 };
+            let times = vec![0.0, 4e-4, -3e-4];
+            let packet = Packet { times, lines: 7..31, samples: 100..480, renewed: false };
             let mut simulator = simulator(&scene, tracer);
             let pulses = simulator.packet(&scene, 3, &packet).expect("a packet");
             let each = pulses.len() / 3;
@@ -79,6 +80,40 @@ fn pulses_are_the_images_of_their_times() {
                     assert!(other > 5.0 * most, "blood has moved by then: {other}");
                 }
             }
+        }
+    }
+    assert_eq!(test_device().validation_messages(), [""; 0]);
+}
+
+/// Over several lives of the scatterers, and of few samples far from the face. Images afterwards show the scene's time.
+#[test]
+fn renewed_pulses_are_the_images_of_their_times_to_the_bit() {
+    for tracer in tracers(&test_device()) {
+        for paths in [1, 3] {
+            let mut scene = scene(paths);
+            let packet = Packet {
+                times: vec![0.0, 0.013, 0.4, -0.021],
+                lines: 12..14,
+                samples: 330..360,
+                renewed: true,
+            };
+            let mut simulator = simulator(&scene, tracer);
+            let pulses = simulator.packet(&scene, 3, &packet).expect("a packet");
+            let each = pulses.len() / packet.times.len();
+            for (pulse, time) in pulses.chunks(each).zip(&packet.times) {
+                scene.set_time(*time);
+                let still = image(&mut simulator, &scene, &packet);
+                assert!(pulse == still, "{tracer}, {paths} paths, at {time} s");
+            }
+            scene.set_time(0.0);
+            let before = image(&mut simulator, &scene, &packet);
+            assert!(pulses[..each] == before[..]);
+            simulator.packet(&scene, 3, &packet).expect("a packet");
+            assert!(image(&mut simulator, &scene, &packet) == before);
+            let power =
+                |pulse: &[[f32; 2]]| -> f32 { pulse.as_flattened().iter().map(|x| x * x).sum() };
+            assert!(pulses.chunks(each).all(|pulse| power(pulse) > 0.0));
+            assert!(pulses[..each] != pulses[each..2 * each]);
         }
     }
     assert_eq!(test_device().validation_messages(), [""; 0]);

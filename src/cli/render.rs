@@ -23,6 +23,7 @@ mod coloured;
 mod film;
 mod labels;
 mod moments;
+mod spectrum;
 
 use film::Film;
 use labels::LabelFiles;
@@ -30,6 +31,28 @@ use moments::{Moment, groups, moments, pace};
 
 /// Frames per second of an animation whose scene time stands still.
 const SHOWN: f64 = 10.0;
+
+/// Doppler modes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Mode {
+    /// Velocity in colours over the image.
+    Color,
+    /// Power of what moves in colours over the image.
+    Power,
+    /// Pulsed wave: spectra of a gate against time.
+    Pw,
+}
+
+impl Mode {
+    /// The colours over an image; none of a mode without one.
+    fn colours(self) -> Option<ColourMode> {
+        match self {
+            Self::Color => Some(ColourMode::Color),
+            Self::Power => Some(ColourMode::Power),
+            Self::Pw => None,
+        }
+    }
+}
 
 /// Arguments of `insonify render`.
 #[derive(Debug, clap::Args)]
@@ -68,13 +91,15 @@ pub struct Render {
     /// is outside. Several frames are numbered as images are.
     #[arg(long, value_name = "FILE")]
     labels: Option<PathBuf>,
-    /// Colours the image by a packet of pulses in the colour box of the scene's [doppler]: `color` shows velocities, red towards
-    /// the probe and blue away from it, `power` how much moves. PNG only.
+    /// Doppler. Colours the image by a packet of pulses in the colour box of the scene's [doppler]: `color` shows velocities, red
+    /// towards the probe and blue away from it, `power` how much moves. `pw` records the gate of [spectral] instead of an
+    /// image, and shows its spectra against time; NAME.json says what is measured on them. PNG only.
     #[arg(long, value_enum, conflicts_with = "dump")]
-    mode: Option<ColourMode>,
+    mode: Option<Mode>,
     /// Writes the packet of the last frame of --mode: `iq` (pulse, scanline, sample; real and imaginary), `times` (s), `depth`
     /// (mm), and what was found, `velocity` (mm/s, towards the probe), `variance`, `power` (scanline, sample); packet.json says
-    /// frequency, speed of sound and PRF. NAME.npz
+    /// frequency, speed of sound and PRF. Of `pw`: `iq` (pulse; real and imaginary), `spectrum` (time, velocity), `velocity`,
+    /// `times`, and the traces `maximum` and `mean`. NAME.npz
     #[arg(long, value_name = "FILE", requires = "mode")]
     packet: Option<PathBuf>,
     /// Writes every stage as a numbered array with its axes into this folder.
@@ -110,12 +135,16 @@ pub fn run(args: &Render) -> Result<()> {
     let moments = moments(args, &scene)?;
     let frames = u32::try_from(moments.len()).expect("no more than can be asked for");
     film::check(&output, frames)?;
-    if args.mode.is_some() {
-        film::check_colour(&output)?;
-        coloured::check(&scene)?;
-        if let Some(packet) = &args.packet {
-            coloured::check_packet(packet)?;
+    match args.mode {
+        Some(Mode::Pw) => spectrum::check(args, &output, &scene)?,
+        Some(_) => {
+            film::check_colour(&output)?;
+            coloured::check(&scene)?;
         }
+        None => {}
+    }
+    if let Some(packet) = &args.packet {
+        coloured::check_packet(packet)?;
     }
     if let Some(labels) = &args.labels {
         labels::check(labels, frames, &scene)?;
@@ -127,6 +156,15 @@ pub fn run(args: &Render) -> Result<()> {
         args.common.stage(&mut scene, &library)?;
 
     let sidecar = sidecar(args, &output, &scene, &of_file, &device, tracer)?;
+    if args.mode == Some(Mode::Pw) {
+        let (timings, mut said) =
+            spectrum::write(args, &output, &mut simulator, &mut scene, sidecar)?;
+        if let Some(file) = &args.json {
+            said.insert("stages_ms".into(), stage_statistics(&timings).into());
+            common::write_json(file, &said)?;
+        }
+        return args.common.validated(&device);
+    }
     let (timings, sidecar) =
         simulate(&mut simulator, &mut library, &mut scene, args, &output, moments, sidecar)?;
     if let Some(dir) = &args.dump {
@@ -316,7 +354,8 @@ fn simulate(
     let mut timings = Vec::new();
     let mut unseen = scene.masks_off_the_image();
     // Packets are made one by one, each behind its image.
-    let at_once = if args.mode.is_some() { 1 } else { simulator.most_shots() };
+    let colours = args.mode.and_then(Mode::colours);
+    let at_once = if colours.is_some() { 1 } else { simulator.most_shots() };
     for group in groups(&moments, scene, at_once) {
         reload(simulator, library);
         scene.set_time(moments[group.start].seconds);
@@ -338,7 +377,7 @@ fn simulate(
             }
             let last = index + 1 == moments.len();
             let packet = args.packet.as_deref().filter(|_| last);
-            film.add(index as u32, simulator, scene, args.mode.map(|mode| (mode, packet)))?;
+            film.add(index as u32, simulator, scene, colours.map(|mode| (mode, packet)))?;
             progress.done(index as u32 + 1);
         }
         let took = simulator.wait().into_diagnostic()?.pop().unwrap_or_default();

@@ -1,6 +1,9 @@
 //! Doppler processing of packets of pulses: wall filter, autocorrelation, and velocity, variance and power from them.
 
 mod colour;
+pub mod gate;
+pub mod spectrum;
+pub mod trace;
 
 use std::f64::consts::PI;
 use std::ops::Range;

@@ -14,6 +14,7 @@ mod key;
 mod probe;
 mod processing;
 mod simulation;
+mod spectral;
 pub mod suggest;
 mod surface;
 mod tissue;
@@ -34,6 +35,7 @@ pub use processing::Processing;
 pub use simulation::{
     Coherence, Loss, Quality, Refraction, Sampling, ScatterMode, Sequence, Simulation, TextureSpace,
 };
+pub use spectral::Spectral;
 pub use surface::Surface;
 pub use tissue::Tissue;
 pub use value::{Value, plain};
@@ -92,6 +94,8 @@ settings! {
     imaging: Imaging;
     /// The display chain.
     processing: Processing;
+    /// Pulsed-wave Doppler.
+    spectral: Spectral;
 }
 
 impl Settings {

@@ -30,6 +30,7 @@ use super::layout::NONE;
 use super::placement::rigid;
 use crate::scene::{Instance, Mesh, Scene, Strategy};
 use crate::settings::TextureSpace;
+pub(crate) use flows::Carried;
 use flows::FlowSlots;
 pub use grid::Grid;
 use solve::{Patch, Solver};

@@ -263,7 +263,8 @@ shared! {
         image_width: u32, image_height: u32, pixel_pitch: f32, image_left: f32,
         image_top: f32, beam_width: f32, emission_lobe: f32, ray_mask: u32,
         branch_floor: f32, couplant: u32, first_line: u32, lines_beside: u32,
-        echo_first: u32, echo_lines: u32, piece: u32, unused0: u32,
+        echo_first: u32, echo_lines: u32, piece: u32, first_sample: u32,
+        end_sample: u32, beam_first: u32, beam_lines: u32, unused0: u32,
     }
     /// Start and direction of a scanline, in probe space; the last entry is the edge of the face.
     struct Scanline { x: f32, z: f32, sine: f32, cosine: f32 }

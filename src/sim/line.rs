@@ -6,7 +6,7 @@
 use std::ops::Range;
 
 use super::lane::{Shot, pixels};
-use super::layout::{self, LATERAL_REACH};
+use super::layout::{self, LATERAL_REACH, Row, SCATTER_BIN};
 use super::tables::Tables;
 use super::{Outputs, SimError, Simulator};
 use crate::output::picture::grey;
@@ -19,8 +19,10 @@ pub(super) struct LineRange {
     first: u32,
     /// How many they are.
     count: u32,
-    /// Samples that are made.
+    /// Samples of which they are made, up to the last one in which something echoes there.
     samples: u32,
+    /// Of these the first that is heard and the end, of the scanlines without those beside them; none: all of them.
+    heard: Option<[u32; 2]>,
     /// Grey levels from the face to the image's depth, of a scanline that is shown alone; none: nothing is shown.
     rows: Option<u32>,
     /// Scanlines beside them, on each side, that are made: those that they are smoothed with, and those that the apertures of
@@ -31,12 +33,29 @@ pub(super) struct LineRange {
 }
 
 impl LineRange {
-    /// The scanlines `lines`, up to sample `samples`, which nothing shows.
-    pub(super) fn of(scene: &Scene, tables: &Tables, lines: Range<u32>, samples: u32) -> Self {
-        let smoothed = smoothed(tables);
-        let reach = smoothed + aperture_reach(scene, tables);
+    /// These samples of these scanlines, which nothing shows.
+    pub(super) fn of(scene: &Scene, tables: &Tables, lines: Range<u32>, heard: Range<u32>) -> Self {
+        // A scatterer echoes up to two bins beside its own.
+        let samples = heard.end.next_multiple_of(SCATTER_BIN) + 2 * SCATTER_BIN;
+        let whole = Self::whole(scene, tables, lines, heard.clone());
+        Self { samples, heard: Some([heard.start, heard.end]), ..whole }
+    }
+
+    /// These scanlines, smoothed for what is heard in these samples.
+    fn whole(scene: &Scene, tables: &Tables, lines: Range<u32>, heard: Range<u32>) -> Self {
+        let [first, end] = [heard.start, heard.end].map(|k| (k as usize).min(tables.rows.len()));
+        let smoothed = smoothed(&tables.rows[first..end]);
+        let reach = smoothed + aperture_reach(scene, &tables.rows[..end]);
         let count = lines.end - lines.start;
-        Self { first: lines.start, count, samples, rows: None, reach, smoothed }
+        Self {
+            first: lines.start,
+            count,
+            samples: heard.end,
+            heard: None,
+            rows: None,
+            reach,
+            smoothed,
+        }
     }
 
     /// The constants of a frame of these scanlines alone.
@@ -54,6 +73,13 @@ impl LineRange {
         frame.lines_beside = lines - count;
         (frame.echo_first, frame.echo_lines) = (echo_first - first, echo_lines);
         frame.samples = self.samples.min(frame.samples);
+        frame.end_sample = frame.samples;
+        frame.beam_lines = count;
+        if let Some([start, end]) = self.heard {
+            frame.first_sample = start;
+            frame.end_sample = end.min(frame.samples);
+            (frame.beam_first, frame.beam_lines) = (self.first - first, self.count);
+        }
         if let Some(rows) = self.rows {
             frame.flags |= layout::FLAG_LINE;
             frame.image_width = 1;
@@ -66,13 +92,13 @@ impl LineRange {
 
 /// Scanlines on each side that what the aperture lets through depends on, at most: those that it reaches over, at any depth in
 /// front of a target.
-fn aperture_reach(scene: &Scene, tables: &Tables) -> u32 {
+fn aperture_reach(scene: &Scene, rows: &[Row]) -> u32 {
     if !scene.simulation.loses_by_aperture() {
         return 0;
     }
     let probe = &scene.probe;
     let pitch = probe.line_pitch(0.0);
-    let reached = tables.rows.iter().enumerate().skip(1).map(|(k, row)| {
+    let reached = rows.iter().enumerate().skip(1).map(|(k, row)| {
         let depth = k as f64 * probe.sample_pitch();
         let widest = f64::from(row.transmit_half.max(row.receive_half));
         // Rays that converge on the target are farthest from the scanline at the face; there the lines of a phased array meet.
@@ -88,9 +114,9 @@ fn aperture_reach(scene: &Scene, tables: &Tables) -> u32 {
     reached.fold(0.0, f64::max).ceil().min(f64::from(probe.scanlines)) as u32 + levelled
 }
 
-/// Scanlines on each side over which `beam` smooths, at most, with these tables.
-fn smoothed(tables: &Tables) -> u32 {
-    let lines = tables.rows.iter().flat_map(|row| [row.lateral_lines, row.strip_lines]);
+/// Scanlines on each side over which `beam` smooths these samples, at most.
+fn smoothed(rows: &[Row]) -> u32 {
+    let lines = rows.iter().flat_map(|row| [row.lateral_lines, row.strip_lines]);
     let widest = lines.fold(0.0, f32::max);
     ((3.0 * widest).ceil() as u32).min(LATERAL_REACH as u32)
 }
@@ -118,7 +144,7 @@ impl Simulator {
         // Also the tables of settings that this frame is the first to have.
         self.adopt(scene)?;
         let samples = scene.probe.samples;
-        let line = LineRange::of(scene, &self.tables, number..number + 1, samples);
+        let line = LineRange::whole(scene, &self.tables, number..number + 1, 0..samples);
         let line = LineRange { rows: Some(rows), ..line };
         self.make(scene, &[Shot::of(scene, index)], Some(line), &Outputs::default())?;
         let rgba = self.read_again(pixels(false))?;

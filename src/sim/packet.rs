@@ -3,17 +3,18 @@
 use std::ops::Range;
 
 use super::lane::Shot;
-use super::layout::{AXIAL_REACH, Frame, PART_FLOWING, PART_PULSE, PART_STILL, SCATTER_BIN};
+use super::layout::{AXIAL_REACH, Frame, PART_FLOWING, PART_PULSE, PART_STILL};
 use super::line::LineRange;
 use super::pass::{Array, Sizes};
+use super::passes::Passes;
 use super::push::Scatter;
 use super::stages::{AXIAL, BEAM, axial, inputs, scatter};
 use super::{SimError, Simulator};
-use crate::gpu::{BufferKind, Stage};
+use crate::gpu::{BufferKind, Commands, GpuError, Stage};
 use crate::output::npy::Element::{Integer, Word};
 use crate::scene::Scene;
 
-/// Largest packet that is kept on the device, bytes: half of what a signed offset could address.
+/// Largest packet that is made at once, bytes.
 const MOST_BYTES: u64 = 1 << 30;
 
 /// Echoes of the scatterers that do not flow.
@@ -30,14 +31,17 @@ pub struct Packet {
     pub lines: Range<u32>,
     /// Samples of each.
     pub samples: Range<u32>,
+    /// True: what flows goes on as in images, its speed changes and its scatterers are renewed, so that packets may follow each
+    /// other without end. False: one generation of scatterers is carried on at its present speed, for some milliseconds.
+    pub renewed: bool,
 }
 
 impl Packet {
-    /// Pulses that follow each other `rate` times a second, of which the scene's time is the middle.
+    /// Pulses that follow each other `rate` times a second, of which the scene's time is the middle, of blood at its present speed.
     pub fn even(count: u32, rate: f64, lines: Range<u32>, samples: Range<u32>) -> Self {
         let middle = (f64::from(count) - 1.0) / 2.0;
         let times = (0..count).map(|n| (f64::from(n) - middle) / rate).collect();
-        Self { times, lines, samples }
+        Self { times, lines, samples, renewed: false }
     }
 
     /// Returns whether it has the place of this column and row, among the scanlines and samples of the image.
@@ -51,9 +55,9 @@ impl Packet {
 
 impl Simulator {
     /// The echoes of a packet of pulses: complex baseband by pulse, scanline and sample, as [`Self::iq`] has it of an image.
-    /// Tissue is as at the scene's time; what flows is carried on from there at its present speed. Noise differs from pulse
-    /// to pulse; `index` selects it. Costs a frame of these scanlines, and for each pulse what flows there. Results of the last
-    /// image but its pixels are those of the packet's last pulse then.
+    /// Tissue is as at the scene's time; what flows is carried on from there. Noise differs from pulse to pulse; `index` selects
+    /// it. Costs a frame of these scanlines, and for each pulse what flows in these samples. Results of the last image but its
+    /// pixels are those of the packet's last pulse then.
     ///
     /// # Errors
     /// Those of [`Self::frame`]; device out of memory.
@@ -66,16 +70,15 @@ impl Simulator {
         index: u32,
         packet: &Packet,
     ) -> Result<Vec<[f32; 2]>, SimError> {
-        let Packet { times, lines, samples } = packet;
+        let Packet { times, lines, samples, renewed } = packet;
         let probe = &scene.probe;
         assert!(lines.start < lines.end && lines.end <= probe.scanlines, "scanlines {lines:?}");
         assert!(samples.start < samples.end && samples.end <= probe.samples, "samples {samples:?}");
         assert!(!times.is_empty(), "a packet without pulses");
         self.adopt(scene)?;
-        // A scatterer echoes up to two bins beside its own.
-        let last = (samples.end + AXIAL_REACH as u32).next_multiple_of(SCATTER_BIN);
-        let last = last + 2 * SCATTER_BIN;
-        let range = LineRange::of(scene, &self.tables, lines.clone(), last);
+        let beside = AXIAL_REACH as u32;
+        let heard = samples.start.saturating_sub(beside)..samples.end + beside;
+        let range = LineRange::of(scene, &self.tables, lines.clone(), heard);
         let passes = &mut self.passes;
         let mut cmd = self.submissions.begin()?;
         let shots = [Shot::of(scene, index)];
@@ -93,9 +96,17 @@ impl Simulator {
         let copy = cmd.device().buffer("packet", bytes, BufferKind::Readback)?;
         // Where all paths fit into one batch their segments stay, and what does not flow is heard once.
         let once = passes.batches.paths >= frame.paths;
-        let volume = sizes.samples() * 8;
+        let line_bytes = u64::from(frame.samples) * 8;
+        let (first, volume) =
+            (u64::from(frame.echo_first) * line_bytes, u64::from(frame.echo_lines) * line_bytes);
         for (n, time) in times.iter().enumerate() {
-            let pulse = |part: u32| Scatter { part: part | PART_PULSE, time: *time as f32 };
+            let pulse = |part: u32| match renewed {
+                true => Scatter { part, time: 0.0 },
+                false => Scatter { part: part | PART_PULSE, time: *time as f32 },
+            };
+            if *renewed {
+                passes.carry_on(&mut cmd, scene, *time)?;
+            }
             if n == 0 || !once {
                 passes.clear(&mut cmd, &sizes);
                 let part = if once { PART_STILL } else { PART_STILL | PART_FLOWING };
@@ -108,7 +119,7 @@ impl Simulator {
                     _ => (&STILL_ECHOES, &scatter::VOLUME_ECHOES),
                 };
                 cmd.barrier(Stage::Compute, Stage::Transfer);
-                cmd.copy((&buffers[from], 0), (&buffers[to], 0), volume)?;
+                cmd.copy((&buffers[from], first), (&buffers[to], first), volume)?;
             }
             let noise = frame.frame_index.wrapping_add((n as u32).wrapping_mul(0x9e37_79b9));
             let constants = Frame { frame_index: noise, ..frame };
@@ -130,10 +141,23 @@ impl Simulator {
             }
             cmd.barrier(Stage::Transfer, Stage::Compute);
         }
+        if *renewed {
+            passes.carry_on(&mut cmd, scene, 0.0)?;
+        }
         cmd.barrier(Stage::Transfer, Stage::Host);
         cmd.submit()?;
         let mut out = vec![[0.0; 2]; (bytes / 8) as usize];
         self.submissions.read(&copy, bytemuck::cast_slice_mut(&mut out))?;
         Ok(out)
+    }
+}
+
+impl Passes {
+    /// Records what will have flowed `after` seconds from the scene's time, for dispatches behind it.
+    fn carry_on(&self, cmd: &mut Commands<'_>, scene: &Scene, after: f64) -> Result<(), GpuError> {
+        cmd.barrier(Stage::Compute, Stage::Transfer);
+        self.world.carry_on(cmd, scene, after)?;
+        cmd.barrier(Stage::Transfer, Stage::Compute);
+        Ok(())
     }
 }

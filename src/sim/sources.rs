@@ -1,7 +1,7 @@
 //! The settings of which the tables on the device are made, and tables of settings used before.
 
 use crate::scene::{Scene, Surface, Tissue, Wire};
-use crate::settings::Settings;
+use crate::settings::{Settings, Spectral};
 use crate::tables::Tables;
 
 /// Tables of settings used before, kept because settings come back: live quality changes between levels.
@@ -40,8 +40,9 @@ impl Sources {
     /// Those of a scene.
     pub fn of(scene: &Scene) -> Self {
         let mut settings = scene.settings.clone();
-        // Seeds are no part of the tables.
+        // What is no part of the tables.
         settings.simulation.seed = 0;
+        settings.spectral = Spectral::default();
         Self {
             settings,
             tissues: scene.tissues.clone(),

@@ -124,6 +124,8 @@ fn constants(
         image_left: (-f64::from(image_width) * pixel_pitch / 2.0) as f32,
         image_top: top as f32,
         echo_lines: probe.scanlines,
+        beam_lines: probe.scanlines,
+        end_sample: probe.samples,
         piece: piece(probe.sample_pitch()),
         ..layout::Frame::default()
     }

@@ -40,7 +40,7 @@ pub mod rows;
 pub mod scenes;
 mod selectors;
 mod shadow;
-mod speckle;
+pub mod speckle;
 mod squeeze;
 mod stages;
 mod strips;

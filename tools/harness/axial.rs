@@ -1,6 +1,6 @@
 //! `axial`: the pulse's envelope along each line. Its detection is the subject `detect`.
 
-use super::inputs::{Random, frame, rows, samples};
+use super::inputs::{Random, frame, made, narrow, rows, samples};
 use super::{Case, Check, Input, Job, Size, Subject};
 use crate::reference::axial;
 use insonify::sim::layout::Frame;
@@ -19,7 +19,7 @@ pub const SUBJECT: Subject = Subject {
 };
 
 fn job(case: Case, size: Size) -> Job {
-    let frame = frame(case, size);
+    let frame = narrow(case, frame(case, size));
     let mut lateral = Random(2).floats(2 * samples(&frame), -1.0, 1.0);
     if case == Case::NotFinite {
         lateral[20] = f32::NAN;
@@ -48,5 +48,6 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     let sum = (f64::from(frame.axial_sigma) * std::f64::consts::TAU.sqrt()).max(1.0);
     let finite = lateral.iter().filter(|v| v.is_finite());
     let largest = f64::from(finite.fold(0.0_f32, |m, v| m.max(v.abs())));
+    let (got, expected) = (made(&frame, &got), made(&frame, &expected));
     vec![Check::close("iq", &got, &expected, |_| 2e-6 * sum * largest)]
 }

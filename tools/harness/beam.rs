@@ -1,6 +1,6 @@
 //! `beam`: accumulators to amplitudes, lateral smoothing, noise.
 
-use super::inputs::{Random, frame, rows, samples};
+use super::inputs::{Random, frame, made, narrow, rows, samples};
 use super::{Case, Check, Input, Job, Size, Subject};
 use crate::reference::beam;
 use insonify::sim::layout::{Counters, Frame, Row};
@@ -37,7 +37,7 @@ pub(super) fn contact(frame: &Frame, random: &mut Random) -> Vec<f32> {
 }
 
 fn job(case: Case, size: Size) -> Job {
-    let mut frame = frame(case, size);
+    let mut frame = narrow(case, frame(case, size));
     let mut rows = rows(&frame);
     frame.noise = NOISE;
     // Most cases have point targets.
@@ -87,7 +87,7 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
         4e-7 * undone.max(0.0) + 1e-5 * f64::from(frame.noise)
     };
     vec![
-        Check::close("lateral", &got, &expected, allowed),
+        Check::close("lateral", &made(&frame, &got), &made(&frame, &expected), allowed),
         Check::equal(
             "saturated",
             &[counters[0].saturated],

@@ -113,6 +113,8 @@ pub fn frame(case: Case, size: Size) -> Frame {
         first_line: if case == Case::Odd { 3 } else { 0 },
         lines_beside: if case == Case::Odd { 9 } else { 0 },
         echo_lines: scanlines,
+        beam_lines: scanlines,
+        end_sample: samples,
         // Some pieces have a bin, some an eighth of one.
         piece: match case {
             Case::Odd => 64,
@@ -124,6 +126,29 @@ pub fn frame(case: Case, size: Size) -> Frame {
         pixel_pitch: 0.25,
         ..Frame::default()
     }
+}
+
+/// The frame of a case for the stages behind the segments: that of a packet, in the odd case, is without the samples near
+/// the face and without the outer scanlines.
+pub fn narrow(case: Case, frame: Frame) -> Frame {
+    match case {
+        Case::Odd => Frame { first_sample: 5, beam_first: 2, beam_lines: 12, ..frame },
+        _ => frame,
+    }
+}
+
+/// Complex samples by line, 0 where the frame does not make them.
+pub fn made<T: Copy + Default>(frame: &Frame, values: &[T]) -> Vec<T> {
+    let line = 2 * frame.samples.max(1) as usize;
+    let heard = 2 * frame.first_sample as usize..2 * frame.end_sample as usize;
+    let beams = frame.beam_first..frame.beam_first + frame.beam_lines;
+    let kept = |(i, &v): (usize, &T)| match heard.contains(&(i % line))
+        && beams.contains(&((i / line) as u32))
+    {
+        true => v,
+        false => T::default(),
+    };
+    values.iter().enumerate().map(kept).collect()
 }
 
 /// One row per sample; widths grow with depth.

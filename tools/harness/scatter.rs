@@ -1,7 +1,7 @@
 //! `scatter`: echoes of scatterers and points along segments.
 
 use super::check::relative_norm;
-use super::inputs::{Random, lines, rows, scanlines};
+use super::inputs::{Random, lines, made, rows, scanlines};
 use super::{Case, Check, Extent, Input, Job, Size, Subject, trace, worlds};
 use crate::reference::aperture::Passed;
 use crate::reference::{Segment, origin, scatter};
@@ -84,6 +84,7 @@ pub(super) fn scene(case: Case, size: Size) -> Job {
         // Enough samples to reach into a second window.
         let mut frame: Frame = job.one("frame");
         frame.samples = layout::SCATTER_WINDOW + BEYOND;
+        frame.end_sample = frame.samples;
         frame.sample_pitch = frame.depth / frame.samples as f32;
         job.inputs[0] = Input::words("frame", &[frame]);
     }
@@ -115,6 +116,11 @@ fn job_of(mut job: Job, case: Case) -> Job {
     let points = with_spheres(points);
     if case == Case::Odd {
         frame.flags |= FLAG_VOXEL;
+    }
+    if case == Case::NotFinite {
+        // That of a gate: a bin's scatterers before it are heard in it.
+        frame.first_sample = layout::SCATTER_BIN + 3;
+        frame.end_sample = 3 * layout::SCATTER_BIN + 5;
     }
     job.inputs[0] = Input::words("frame", &[frame]);
     let (mut segments, counts, apertures) = segments(&job, &frame);
@@ -181,7 +187,9 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     let (twin, points) = (scatter::scatter(&world, &held, heard), scatter::points(&world, &held));
     let [echoes, point_echoes] = ["volume_echoes", "point_echoes"].map(|name| {
         let echoes: Vec<i32> = job.after(outputs, name);
-        echoes.into_iter().map(f64::from).collect::<Vec<f64>>()
+        let echoes: Vec<f64> = echoes.into_iter().map(f64::from).collect();
+        // Point targets are all heard.
+        if name == "volume_echoes" { made(frame, &echoes) } else { echoes }
     });
     // A cell whose middle lies within 8e-6 mm of either end of the layer's slab may count or not: that share
     // of the scatterers, and of their power.
@@ -190,6 +198,7 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
         if frame.flags & FLAG_VOXEL == 0 { (2e-3_f64.powi(2) + at_an_end).sqrt() } else { 3e-2 };
     let [fixed, point_fixed] =
         [&twin, &points].map(|twin| twin.fixed.iter().map(|&x| x as f64).collect::<Vec<f64>>());
+    let fixed = made(frame, &fixed);
     // Without points there is no room for their echoes.
     let point_fixed = if frame.points > 0 { &point_fixed[..] } else { &[] };
     let counters: Counters = job.after(outputs, "counters")[0];

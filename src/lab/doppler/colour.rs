@@ -8,7 +8,7 @@ use crate::sim::calibration::Calibration;
 use crate::sim::facts::Area;
 
 /// Quantity that the colours of an image show.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ColourMode {
     /// Velocity: red towards the probe, blue away from it, the brighter the faster.
     Color,

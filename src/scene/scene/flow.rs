@@ -109,17 +109,18 @@ impl Flow {
         (2.0 * shear.min(way)).min(LONGEST_LIFE)
     }
 
-    /// The two generations of now, of which each lives for `lifetime`.
-    pub fn generations(&self, lifetime: f64) -> [Generation; 2] {
+    /// The two generations of `after` seconds from now, of which each lives for `lifetime`.
+    pub fn generations(&self, lifetime: f64, after: f64) -> [Generation; 2] {
+        let seconds = self.seconds + after;
         [0.0, 0.5].map(|later| {
-            let lives = self.seconds / lifetime + later;
+            let lives = seconds / lifetime + later;
             let age = lives - lives.floor() - 0.5;
             let halves = 2.0 * lives.floor() + 2.0 * later;
             Generation {
                 // Numbers begin again after two million, long after the same ones have gone.
                 number: halves.rem_euclid(f64::from(1 << 21)) as u32,
                 weight: (std::f64::consts::PI * age).cos(),
-                way: self.way(self.seconds - age * lifetime, self.seconds),
+                way: self.way(seconds - age * lifetime, seconds),
             }
         })
     }
@@ -145,9 +146,7 @@ impl FlowShape {
         match self {
             Self::Uniform(_) => 0.0,
             Self::Tube { line, exponent } => {
-                let m = &placed.matrix3;
-                let thinnest = [m.x_axis, m.y_axis, m.z_axis].map(DVec3::length);
-                let thinnest = thinnest.into_iter().fold(f64::INFINITY, f64::min);
+                let thinnest = thinnest(placed);
                 let at =
                     |radius: f64| exponent / (radius * thinnest) * (line.radius() / radius).powi(2);
                 line.radii().map(at).fold(0.0, f64::max)
@@ -155,13 +154,21 @@ impl FlowShape {
         }
     }
 
-    /// The narrowest radius, in the mesh's space; none of a shape that is alike everywhere.
-    pub fn narrowest(&self) -> Option<f64> {
+    /// The narrowest radius, mm, in the space to which `placed` brings the mesh; none of a shape that is alike everywhere.
+    pub fn narrowest(&self, placed: &DAffine3) -> Option<f64> {
         match self {
             Self::Uniform(_) => None,
-            Self::Tube { line, .. } => Some(line.radii().fold(f64::INFINITY, f64::min)),
+            Self::Tube { line, .. } => {
+                Some(thinnest(placed) * line.radii().fold(f64::INFINITY, f64::min))
+            }
         }
     }
+}
+
+/// The smallest factor by which a placement stretches the axes of a mesh.
+fn thinnest(placed: &DAffine3) -> f64 {
+    let m = &placed.matrix3;
+    [m.x_axis, m.y_axis, m.z_axis].map(DVec3::length).into_iter().fold(f64::INFINITY, f64::min)
 }
 
 #[cfg(test)]
@@ -227,10 +234,10 @@ mod tests {
         let lifetime = flow.lifetime(&DAffine3::IDENTITY);
         // The wall's shear is 2 * 800 / 3 a second.
         assert!((lifetime - 2.0 * MOST_SHEAR * 3.0 / 1600.0).abs() < 1e-12, "{lifetime}");
-        let mut before = flow.generations(lifetime);
+        let mut before = flow.generations(lifetime, 0.0);
         for i in 1..4000 {
             flow.seconds = f64::from(i) * lifetime / 200.0;
-            let now = flow.generations(lifetime);
+            let now = flow.generations(lifetime, 0.0);
             let power: f64 = now.iter().map(|g| g.weight * g.weight).sum();
             assert!((power - 1.0).abs() < 1e-12);
             assert_ne!(now[0].number, now[1].number);

@@ -3,7 +3,7 @@
 //! parameters and does not list them; [`SUGGESTED`] are ours.
 
 use crate::settings::units::ANGLE;
-use crate::settings::{Facts, Form, Group, Member, Settings, Value, Visitor};
+use crate::settings::{Facts, Form, Group, Member, Settings, Spectral, Value, Visitor};
 
 /// Distance from the scene's own value, below and above.
 #[derive(Clone, Copy, Debug)]
@@ -67,7 +67,10 @@ impl Parameter {
         struct All(Vec<Parameter>);
         impl Visitor for All {
             fn visit<T: Group>(&mut self, _: Member<T>) {
-                self.0.extend(numbers::<T>());
+                // A contact sheet has no spectra.
+                if T::TABLE != Spectral::TABLE {
+                    self.0.extend(numbers::<T>());
+                }
             }
         }
         let mut all = All(Vec::new());

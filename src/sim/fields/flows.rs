@@ -67,7 +67,7 @@ impl Fields {
         for flow in &scene.flows {
             // A world that only tries a tracer has no fields.
             let Some(slots) = self.flows[flow.instance] else { continue };
-            let now = vectors(flow, slots.lifetime);
+            let now = vectors(flow, slots.lifetime, 0.0);
             let at = slots.first as usize;
             let kept = &mut self.values[at..at + now.len()];
             if *kept != now {
@@ -77,10 +77,19 @@ impl Fields {
         }
         changed
     }
+
+    /// What the flows will have carried `after` seconds from the time to which they were brought last.
+    pub(crate) fn carried(&self, scene: &Scene, after: f64) -> Vec<Carried> {
+        let of = |flow: &Flow| {
+            let slots = self.flows[flow.instance]?;
+            Some((slots.first, vectors(flow, slots.lifetime, after)))
+        };
+        scene.flows.iter().filter_map(of).collect()
+    }
 }
 
-fn vectors(flow: &Flow, lifetime: f64) -> Vectors {
-    let generations = flow.generations(lifetime);
+fn vectors(flow: &Flow, lifetime: f64, after: f64) -> Vectors {
+    let generations = flow.generations(lifetime, after);
     let [first, second] = generations;
     let louder = if second.weight > first.weight { second } else { first };
     let pulses = [flow.pace(1.0) as f32, louder.number as f32, louder.way as f32];
@@ -99,14 +108,9 @@ fn of_shape(
     let meshes = instance.keyframes.meshes.iter().chain([&instance.mesh]);
     let vertices = meshes.flat_map(|&mesh| &scene.meshes[mesh].positions);
     let vertices = vertices.map(|&p| texture.transform_point3(DVec3::from(p.map(f64::from))));
-    let grid = match shape.narrowest() {
+    let grid = match shape.narrowest(&texture) {
         None => Grid::one_cell(vertices),
-        Some(radius) => {
-            let m = &texture.matrix3;
-            let thinnest = [m.x_axis, m.y_axis, m.z_axis].map(DVec3::length);
-            let thinnest = thinnest.into_iter().fold(f64::INFINITY, f64::min);
-            Grid::spaced(vertices, radius * thinnest / NODES_PER_RADIUS, MOST_NODES)
-        }
+        Some(radius) => Grid::spaced(vertices, radius / NODES_PER_RADIUS, MOST_NODES),
     };
     // Texture space has the directions of the placement's rigid part.
     let turn = rigid(rest).inverse() * *rest;

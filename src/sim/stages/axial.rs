@@ -17,6 +17,9 @@ pub const AXIAL: Pass = Pass {
     name: "axial",
     binds: &[&FRAME, &ROWS, &LATERAL, &IQ, &LOG_IMAGE],
     makes: &[&IQ, &LOG_IMAGE],
-    extent: Some(|f| Extent::Threads([f.samples.div_ceil(AXIAL_SAMPLES), f.scanlines, 1])),
+    extent: Some(|f| {
+        let samples = f.samples - f.first_sample;
+        Extent::Threads([samples.div_ceil(AXIAL_SAMPLES), f.beam_lines, 1])
+    }),
     ..Pass::USUAL
 };

@@ -24,6 +24,8 @@ pub const BEAM: Pass = Pass {
         &POINT_ECHOES,
     ],
     makes: &[&LATERAL],
-    extent: Some(|f| Extent::Threads([f.samples, f.scanlines.div_ceil(BEAM_LINES), 1])),
+    extent: Some(|f| {
+        Extent::Threads([f.samples - f.first_sample, f.beam_lines.div_ceil(BEAM_LINES), 1])
+    }),
     ..Pass::USUAL
 };

@@ -1,25 +1,21 @@
-//! The table `doppler`.
+//! The tables of Doppler modes, which must fit the probe.
 
 use super::document::Document;
 use super::error::SceneError;
 use super::table::Stated;
-use crate::probe::Probe;
-use crate::settings::Doppler;
 
-/// The settings of the table, which must fit the probe and each other where the file states some.
-pub(super) fn doppler(
+/// Refuses settings that do not fit the probe or each other, where the file states some of them: `fault` says the key, the
+/// cause and the remedy.
+pub(super) fn fits(
     document: &Document<'_>,
+    table: &str,
     stated: &Stated,
-    probe: &Probe,
-) -> Result<Doppler, SceneError> {
-    let made: Doppler = stated.get("");
-    let Some(first) = stated.keys().next() else { return Ok(made) };
-    match made.fault(probe) {
-        None => Ok(made),
-        Some((key, message, remedy)) => {
-            // The key that is written, where the other one of two is at fault.
-            let at = if stated.has(key) { key } else { first };
-            Err(document.fail(&format!("doppler.{at}"), message, remedy))
-        }
-    }
+    fault: Option<(&str, String, String)>,
+) -> Result<(), SceneError> {
+    let (Some((key, message, remedy)), Some(first)) = (fault, stated.keys().next()) else {
+        return Ok(());
+    };
+    // The key that is written, where the other one of two is at fault.
+    let at = if stated.has(key) { key } else { first };
+    Err(document.fail(&format!("{table}.{at}"), message, remedy))
 }

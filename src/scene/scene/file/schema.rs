@@ -25,8 +25,8 @@ use super::tissues::TissueKeys;
 use super::tracker::{MatrixKey, TrackerKeys};
 use super::vary::VaryKeys;
 use crate::settings::{
-    Display, Doppler, Form, Fusion, Imaging, Live, Probe, Processing, Simulation, Surface, Tissue,
-    group,
+    Display, Doppler, Form, Fusion, Imaging, Live, Probe, Processing, Simulation, Spectral,
+    Surface, Tissue, group,
 };
 
 group! {
@@ -176,6 +176,7 @@ tables! {
         defaults::<Placed>("world_from_reference."), defaults::<MatrixKey>("world_from_reference."),
         defaults::<Placed>("tool_from_probe."), defaults::<MatrixKey>("tool_from_probe.");
     doppler: One<Doppler>, "doppler": defaults::<Doppler>("");
+    spectral: One<Spectral>, "spectral": defaults::<Spectral>("");
     live: One<Live>, "live": defaults::<Live>("");
 }
 
