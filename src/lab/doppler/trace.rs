@@ -7,8 +7,8 @@ const BESIDE: f64 = 0.005;
 /// Share of the range of velocities over which they are averaged, to either side.
 const SPREAD: f64 = 0.01;
 /// Power over that of the noise at which something is heard.
-const HEARD: f64 = 4.0;
-/// Share of a spectrum's bins that are taken for noise: the quietest ones.
+const HEARD: f64 = 5.0;
+/// Share of the bins that are quieter, on the average over all times, than the one whose power is taken for that of noise.
 const QUIET: f64 = 0.25;
 /// Shortest time between two beats, s.
 const SHORTEST_BEAT: f64 = 0.25;
@@ -34,6 +34,17 @@ fn smoothed(values: &[f64], reach: usize) -> Vec<f64> {
     (0..values.len()).map(mean).collect()
 }
 
+/// Power of noise, which is the same at all times.
+fn noise(made: &Spectrogram) -> f64 {
+    let bins = made.velocities.len();
+    let mut sums = vec![0.0; bins];
+    for column in made.columns() {
+        sums.iter_mut().zip(column).for_each(|(sum, &power)| *sum += f64::from(power));
+    }
+    sums.sort_by(f64::total_cmp);
+    sums[(QUIET * bins as f64) as usize] / made.times.len().max(1) as f64
+}
+
 /// The traces of spectra.
 pub fn trace(made: &Spectrogram) -> Trace {
     let bins = made.velocities.len();
@@ -41,6 +52,7 @@ pub fn trace(made: &Spectrogram) -> Trace {
     let beside = (BESIDE / apart) as usize;
     let columns: Vec<&[f32]> = made.columns().collect();
     let mut out = Trace::default();
+    let noise = noise(made);
     for x in 0..columns.len() {
         let near = &columns[x.saturating_sub(beside)..(x + beside + 1).min(columns.len())];
         let mean = |j: usize| {
@@ -48,11 +60,7 @@ pub fn trace(made: &Spectrogram) -> Trace {
         };
         let power: Vec<f64> = (0..bins).map(mean).collect();
         let power = smoothed(&power, (SPREAD * bins as f64) as usize);
-        let mut sorted = power.clone();
-        sorted.sort_by(f64::total_cmp);
-        let quiet = &sorted[..((QUIET * bins as f64) as usize).max(1)];
-        let noise = quiet.iter().sum::<f64>() / quiet.len() as f64;
-        let peak = sorted[bins - 1];
+        let peak = power.iter().copied().fold(0.0, f64::max);
         if peak <= HEARD * noise {
             out.maximum.push(0.0);
             out.mean.push(0.0);
