@@ -109,6 +109,11 @@ const uint PART_PULSE = 4u;         // as one pulse of a packet hears it: what f
 const uint POINT_GROUP = 8u;        // point targets that share a bounding sphere
 const float UNHEARD = 3.3219281;    // log2(10): what is more than 20 dB below black is not summed
 
+// Colours of what flows.
+const uint COLOUR_COLUMNS = 256u;   // of velocities between the ends of what is told apart, or of powers
+const uint COLOUR_ROWS = 16u;       // of variances, or of directions
+const uint BOX_GREY = 150u;         // outline of the colour box
+
 const uint KIND_CONVEX = 0u;
 const uint KIND_LINEAR = 1u;
 const uint KIND_PHASED = 2u;

@@ -2,11 +2,13 @@
 &[
     ("angles", include_bytes!("angles.spv")),
     ("aperture", include_bytes!("aperture.spv")),
+    ("autocorrelation", include_bytes!("autocorrelation.spv")),
     ("axial", include_bytes!("axial.spv")),
     ("beam", include_bytes!("beam.spv")),
     ("blur", include_bytes!("blur.spv")),
     ("chart", include_bytes!("chart.spv")),
     ("collapse", include_bytes!("collapse.spv")),
+    ("colour", include_bytes!("colour.spv")),
     ("convert", include_bytes!("convert.spv")),
     ("darken", include_bytes!("darken.spv")),
     ("difference", include_bytes!("difference.spv")),
@@ -14,6 +16,7 @@
     ("enhance", include_bytes!("enhance.spv")),
     ("expect", include_bytes!("expect.spv")),
     ("fuse", include_bytes!("fuse.spv")),
+    ("gate", include_bytes!("gate.spv")),
     ("geometry", include_bytes!("geometry.spv")),
     ("interpolate", include_bytes!("interpolate.spv")),
     ("label_bvh", include_bytes!("label_bvh.spv")),
@@ -43,4 +46,5 @@
     ("trace_query", include_bytes!("trace_query.spv")),
     ("view3d_bvh", include_bytes!("view3d_bvh.spv")),
     ("view3d_query", include_bytes!("view3d_query.spv")),
+    ("wall_filter", include_bytes!("wall_filter.spv")),
 ]

@@ -65,14 +65,18 @@ fn colours(file: &Path) -> [usize; 3] {
 fn what_flows_away_is_blue_what_comes_is_red_and_tissue_stays_grey() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();
-    for (mode, speed, redder) in
-        [("color", "30 cm/s", false), ("color", "-30 cm/s", true), ("power", "30 cm/s", true)]
-    {
-        let out = render(
-            folder,
-            "a.png",
-            &["--mode", mode, "--set", &format!("flow.vessel.speed={speed}")],
-        );
+    let none = "doppler.priority=0.5";
+    for (mode, speed, setting, redder) in [
+        ("color", "30 cm/s", none, false),
+        ("color", "-30 cm/s", none, true),
+        ("color", "30 cm/s", "doppler.invert=true", true),
+        // All velocities that are told apart are towards the probe then.
+        ("color", "30 cm/s", "doppler.baseline=1", true),
+        ("power", "30 cm/s", "doppler.directional=true", false),
+        ("power", "30 cm/s", none, true),
+    ] {
+        let speed = format!("flow.vessel.speed={speed}");
+        let out = render(folder, "a.png", &["--mode", mode, "--set", &speed, "--set", setting]);
         assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
         let [red, blue, grey] = colours(&folder.join("a.png"));
         let (most, least) = if redder { (red, blue) } else { (blue, red) };

@@ -100,7 +100,11 @@ subjects!(
     difference,
     reduce,
     collapse,
-    fuse
+    fuse,
+    wall_filter,
+    autocorrelation,
+    gate,
+    colour
 );
 
 /// Names of a kernel's bindings in its source, by number; a ray query's `tlas` takes the place of `nodes`.
@@ -138,8 +142,18 @@ fn bindings_of_stages_and_jobs_have_the_names_of_the_sources() {
 /// For each buffer that a dispatch binds, or its stand-in, the array names the stage that fills it.
 #[test]
 fn every_array_that_a_stage_binds_is_made_by_one() {
-    // Filled level by level, and the volume.
-    let given = ["level", "fine", "coarse", "coarse_change", "change", "acquired"];
+    // Filled level by level, the volume, and those of a packet, which are as large as its box.
+    let given = [
+        "level",
+        "fine",
+        "coarse",
+        "coarse_change",
+        "change",
+        "acquired",
+        "pulses",
+        "lags",
+        "correlations",
+    ];
     for pass in stages::all() {
         for array in pass.binds {
             let is_given = given.contains(&array.name);

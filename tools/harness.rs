@@ -13,6 +13,7 @@ mod blur;
 mod chart;
 pub mod check;
 mod collapse;
+mod colour;
 mod convert;
 mod darken;
 mod detect;
@@ -30,6 +31,7 @@ mod level;
 mod mask;
 mod moments;
 mod origin;
+mod packet;
 mod rays;
 mod reduce;
 mod refit;
@@ -298,7 +300,7 @@ impl Subject {
 }
 
 /// Every kernel of the image, in the order of a frame after the three that only tests use.
-pub const SUBJECTS: [Subject; 31] = [
+pub const SUBJECTS: [Subject; 35] = [
     angles::SUBJECT,
     geometry::SUBJECT,
     rays::SUBJECT,
@@ -330,4 +332,8 @@ pub const SUBJECTS: [Subject; 31] = [
     reduce::SUBJECT,
     collapse::SUBJECT,
     fuse::SUBJECT,
+    packet::WALL_FILTER,
+    packet::AUTOCORRELATION,
+    packet::GATE,
+    colour::SUBJECT,
 ];

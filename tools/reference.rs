@@ -15,6 +15,7 @@ pub mod convert;
 pub mod darken;
 pub mod detect;
 pub mod display;
+pub mod doppler;
 pub mod enhance;
 pub mod expect;
 pub mod field;

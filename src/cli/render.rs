@@ -6,7 +6,6 @@ use miette::{IntoDiagnostic, Result, miette};
 use serde_json::{Map, Value, json};
 
 use super::common::{self, Common, Progress, Stage};
-use insonify::doppler::ColourMode;
 use insonify::gpu::{Device, FrameTimings, peak_bytes};
 use insonify::output;
 use insonify::scene::{Scene, file, shipped};
@@ -16,7 +15,7 @@ use insonify::sim::contact::{REACH_SKIN, UNTOUCHED};
 use insonify::sim::dump;
 use insonify::sim::facts;
 use insonify::sim::shaders::Library;
-use insonify::sim::{Shot, Simulator, Tracer};
+use insonify::sim::{ColourMode, Shot, Simulator, Tracer};
 use insonify::statistics::Statistics;
 
 mod coloured;

@@ -22,7 +22,7 @@ pub mod units;
 mod value;
 mod words;
 
-pub use doppler::{Doppler, WallFilter};
+pub use doppler::{Doppler, VelocityMap, WallFilter};
 pub use exam::Exam;
 pub use field::Field;
 pub use fusion::{Blend, Display, Fusion, MaskSpeed, Surroundings};

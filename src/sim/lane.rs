@@ -11,6 +11,7 @@ use super::buffers::Buffers;
 use super::contact::SkinContact;
 use super::fusion::{FusionResources, Pyramid};
 use super::layout::{self, Frame};
+use super::packet::Packets;
 use super::pass::{Array, Sizes};
 use super::placement;
 use super::read_out::ReadOut;
@@ -62,6 +63,8 @@ pub(super) struct Lane {
     pub(super) read_out: ReadOut,
     /// The contact of the probe with the skin.
     pub(super) touch: Option<SkinContact>,
+    /// Packets of the first lane.
+    pub(super) packets: Packets,
 }
 
 impl Lane {
@@ -79,6 +82,7 @@ impl Lane {
             frame: sizes.frame,
             read_out: ReadOut::default(),
             touch: None,
+            packets: Packets::default(),
         })
     }
 
@@ -95,6 +99,7 @@ impl Lane {
             frame: self.frame,
             read_out: ReadOut::default(),
             touch: None,
+            packets: Packets::default(),
         })
     }
 

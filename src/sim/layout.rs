@@ -134,6 +134,13 @@ constants! {
     /// Amplitude, attenuation made up for, from which on a train of echoes is followed on every line.
     pub const TRAIN_FLOOR: f32 = 5e-4;
 
+    /// Colours of a row of a colour map: of velocities between the ends of what is told apart, or of powers.
+    pub const COLOUR_COLUMNS: u32 = 256;
+    /// Rows of a colour map: of variances, or of directions.
+    pub const COLOUR_ROWS: u32 = 16;
+    /// Grey of the colour box's outline.
+    pub const BOX_GREY: u32 = 150;
+
     /// Curved array.
     pub const KIND_CONVEX: u32 = 0;
     /// Flat array.

@@ -28,6 +28,8 @@ pub(super) struct Last {
     pub(super) tinted: bool,
     /// Its tissues were.
     pub(super) painted: bool,
+    /// What flows was coloured.
+    pub(super) coloured: bool,
     /// Which of its images is read.
     pub(super) chosen: usize,
 }

@@ -1,6 +1,7 @@
 //! Packets of pulses: the same scanlines again and again within milliseconds, of which what flows changes.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use super::lane::Shot;
 use super::layout::{AXIAL_REACH, Frame, PART_FLOWING, PART_PULSE, PART_STILL};
@@ -9,8 +10,8 @@ use super::pass::{Array, Sizes};
 use super::passes::Passes;
 use super::push::Scatter;
 use super::stages::{AXIAL, BEAM, axial, inputs, scatter};
-use super::{SimError, Simulator};
-use crate::gpu::{BufferKind, Commands, GpuError, Stage};
+use super::{Correlation, SimError, Simulator};
+use crate::gpu::{Buffer, BufferKind, Commands, Device, GpuError, Stage};
 use crate::output::npy::Element::{Integer, Word};
 use crate::scene::Scene;
 
@@ -53,6 +54,46 @@ impl Packet {
     }
 }
 
+/// The memory of packets on the device.
+#[derive(Default)]
+pub(super) struct Packets {
+    /// The packet whose pulses are there as they were heard.
+    pub(super) holds: Option<Packet>,
+    pub(super) pulses: Option<Buffer>,
+    /// Correlations of the last coloured one at each sample, and averaged.
+    pub(super) lags: Option<Buffer>,
+    pub(super) correlations: Option<Buffer>,
+    /// Samples that have correlations.
+    pub(super) found: usize,
+}
+
+impl Packets {
+    /// Makes room for the correlations of so many samples.
+    pub(super) fn correlate(
+        &mut self,
+        device: &Arc<Device>,
+        samples: usize,
+    ) -> Result<(), GpuError> {
+        self.found = samples;
+        let bytes = (samples * size_of::<Correlation>()) as u64;
+        room(&mut self.lags, device, "lags", bytes)?;
+        room(&mut self.correlations, device, "correlations", bytes).map(drop)
+    }
+}
+
+/// The buffer that is kept, or a larger one in its place.
+pub(super) fn room<'b>(
+    kept: &'b mut Option<Buffer>,
+    device: &Arc<Device>,
+    name: &str,
+    bytes: u64,
+) -> Result<&'b Buffer, GpuError> {
+    if kept.as_ref().is_none_or(|buffer| buffer.size() < bytes) {
+        *kept = Some(device.buffer(name, bytes, BufferKind::Storage)?);
+    }
+    Ok(kept.as_ref().expect("just made"))
+}
+
 impl Simulator {
     /// The echoes of a packet of pulses: complex baseband by pulse, scanline and sample, as [`Self::iq`] has it of an image.
     /// Tissue is as at the scene's time; what flows is carried on from there. Noise differs from pulse to pulse; `index` selects
@@ -70,6 +111,41 @@ impl Simulator {
         index: u32,
         packet: &Packet,
     ) -> Result<Vec<[f32; 2]>, SimError> {
+        self.make_packet(scene, index, packet)?;
+        self.pulses()
+    }
+
+    /// The echoes of the packet that was made last, as [`Self::packet`] has them.
+    ///
+    /// # Errors
+    /// A Vulkan error.
+    ///
+    /// # Panics
+    /// Without a packet, or if [`Self::colour`] has used it up.
+    pub fn pulses(&mut self) -> Result<Vec<[f32; 2]>, SimError> {
+        self.submissions.wait()?;
+        let packet = self.passes.lanes[0].packets.holds.as_ref().expect("a packet was made");
+        let each = packet.lines.len() * packet.samples.len();
+        let mut out = vec![[0.0; 2]; each * packet.times.len()];
+        let buffer = self.passes.lanes[0].packets.pulses.as_ref().expect("it was made there");
+        self.device.read_into(buffer, 0, bytemuck::cast_slice_mut(&mut out))?;
+        Ok(out)
+    }
+
+    /// Makes a packet of pulses as [`Self::packet`]; its echoes stay on the device.
+    ///
+    /// # Errors
+    /// Those of [`Self::frame`]; device out of memory.
+    ///
+    /// # Panics
+    /// Without pulses, or with scanlines or samples that the probe does not have.
+    pub fn make_packet(
+        &mut self,
+        scene: &Scene,
+        index: u32,
+        packet: &Packet,
+    ) -> Result<(), SimError> {
+        self.passes.lanes[0].packets.holds = None;
         let Packet { times, lines, samples, renewed } = packet;
         let probe = &scene.probe;
         assert!(lines.start < lines.end && lines.end <= probe.scanlines, "scanlines {lines:?}");
@@ -90,10 +166,12 @@ impl Simulator {
         let frame = *passes.frame();
         let each = u64::from(samples.end - samples.start) * 8;
         let bytes = each * u64::from(lines.end - lines.start) * times.len() as u64;
-        if bytes > MOST_BYTES {
-            return Err(SimError::Packet { bytes, most: MOST_BYTES });
+        let most = MOST_BYTES.min(cmd.device().limits().max_storage_buffer_bytes);
+        if bytes > most {
+            return Err(SimError::Packet { bytes, most });
         }
-        let copy = cmd.device().buffer("packet", bytes, BufferKind::Readback)?;
+        let kept = &mut passes.lanes[0].packets.pulses;
+        let copy = room(kept, cmd.device(), "pulses", bytes)?.clone();
         // Where all paths fit into one batch their segments stay, and what does not flow is heard once.
         let once = passes.batches.paths >= frame.paths;
         let line_bytes = u64::from(frame.samples) * 8;
@@ -144,11 +222,9 @@ impl Simulator {
         if *renewed {
             passes.carry_on(&mut cmd, scene, 0.0)?;
         }
-        cmd.barrier(Stage::Transfer, Stage::Host);
         cmd.submit()?;
-        let mut out = vec![[0.0; 2]; (bytes / 8) as usize];
-        self.submissions.read(&copy, bytemuck::cast_slice_mut(&mut out))?;
-        Ok(out)
+        self.passes.lanes[0].packets.holds = Some(packet.clone());
+        Ok(())
     }
 }
 

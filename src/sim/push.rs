@@ -116,6 +116,56 @@ push! {
         /// 1: every intermediate image is wanted everywhere.
         complete: u32,
     }
+    /// The pulses of a packet, and what is taken off them.
+    "wall_filter" WallFilter {
+        /// Pulses.
+        count: u32,
+        /// Scanlines of each.
+        lines: u32,
+        /// Samples of a scanline.
+        samples: u32,
+        /// Polynomials.
+        taken: u32,
+    }
+    /// The pulses of a packet.
+    "autocorrelation" Autocorrelation {
+        /// Pulses.
+        count: u32,
+        /// Scanlines of each.
+        lines: u32,
+        /// Samples of a scanline.
+        samples: u32,
+    }
+    /// The average along scanlines.
+    "gate" Gate {
+        /// Scanlines.
+        lines: u32,
+        /// Samples of a scanline.
+        samples: u32,
+        /// Samples on each side that are averaged over.
+        reach: u32,
+    }
+    /// The colour box, and when and how it is coloured.
+    "colour" Colour {
+        /// First scanline of the box.
+        first_line: u32,
+        /// Scanlines of the box.
+        lines: u32,
+        /// First sample of the box.
+        first_sample: u32,
+        /// Samples of the box.
+        samples: u32,
+        /// 1: power is shown, 0: velocity.
+        shows_power: u32,
+        /// Grey level of the image from which on it stands in front.
+        priority: u32,
+        /// Power from which on there is colour; that of the echo of a perfect mirror is 1.
+        least: f32,
+        /// Factor on powers.
+        gain: f32,
+        /// Velocity in the middle of those that are told apart, over Nyquist's.
+        baseline: f32,
+    }
     /// Colour of acquired pixels.
     "tint" Tint {
         /// Opacity over a pixel that is all acquired, 0 to 1.

@@ -7,6 +7,7 @@ pub use axial::AXIAL;
 pub use beam::BEAM;
 pub use blur::BLUR;
 pub use chart::CHART;
+pub use colour::COLOUR;
 pub use convert::CONVERT;
 pub use display::DISPLAY;
 pub use enhance::ENHANCE;
@@ -29,6 +30,7 @@ pub mod axial;
 pub mod beam;
 pub mod blur;
 pub mod chart;
+pub mod colour;
 pub mod convert;
 pub mod display;
 pub mod enhance;
@@ -81,7 +83,7 @@ pub const FUSION: [&Pass; 11] = [
 
 /// All stages.
 pub fn all() -> impl Iterator<Item = &'static Pass> {
-    IMAGE.into_iter().chain(LABELS).chain([&PAINT]).chain(FUSION)
+    IMAGE.into_iter().chain(LABELS).chain([&PAINT]).chain(FUSION).chain(&COLOUR)
 }
 
 /// Names of all stages, in order; the time of a stage is reported under its name.
@@ -94,7 +96,8 @@ pub fn names() -> Vec<&'static str> {
 /// Stages that frames of a scene may run, with any settings.
 pub(super) fn of(scene: &Scene) -> impl Iterator<Item = &'static Pass> {
     let fusion = scene.volume.is_some().then_some(FUSION);
-    IMAGE.into_iter().chain(LABELS).chain([&PAINT]).chain(fusion.into_iter().flatten())
+    let always = IMAGE.into_iter().chain(LABELS).chain([&PAINT]);
+    always.chain(fusion.into_iter().flatten()).chain(&COLOUR)
 }
 
 /// The buffers that a frame of `scene` needs.

@@ -6,12 +6,11 @@ use miette::{IntoDiagnostic, Result, miette};
 use serde_json::{Value, json};
 
 use crate::cli::common;
-use insonify::doppler::{self, ColourMode, Correlation};
+use insonify::doppler;
 use insonify::output::npy::Element;
 use insonify::output::npz::{self, Entry};
 use insonify::scene::Scene;
-use insonify::sim::facts::Area;
-use insonify::sim::{Packet, Simulator};
+use insonify::sim::{ColourMode, Correlation, Packet, Simulator};
 
 /// Refuses settings with which nothing could be coloured.
 ///
@@ -40,35 +39,38 @@ pub fn check_packet(file: &Path) -> Result<()> {
 }
 
 /// The last image of the simulator in colour, RGBA, and what is said of it. The packet goes into `file`, where one is given.
-/// The simulator holds the packet then.
 pub fn coloured(
     simulator: &mut Simulator,
     scene: &Scene,
     mode: ColourMode,
     index: u32,
-    area: &Area,
     file: Option<&Path>,
 ) -> Result<(Vec<u8>, Value)> {
-    let (_, _, mut rgba) = simulator.pixels().into_diagnostic()?;
-    let packet = doppler::packet(&scene.probe, &scene.doppler);
-    let echoes = simulator.packet(scene, index, &packet).into_diagnostic()?;
-    let found = doppler::process(scene, &packet, &echoes);
-    doppler::colour(scene, mode, &packet, &found, area, &mut rgba);
+    let settings = &scene.doppler;
+    let packet = doppler::packet(&scene.probe, settings);
+    simulator.make_packet(scene, index, &packet).into_diagnostic()?;
+    // Before they are filtered.
+    let echoes = file.map(|_| simulator.pulses()).transpose().into_diagnostic()?;
+    simulator.colour(scene, mode, None).into_diagnostic()?;
+    let rgba = simulator.coloured_pixels().into_diagnostic()?.expect("just made");
     let said = json!({
         "shows": match mode {
             ColourMode::Color => "velocity",
             ColourMode::Power => "power",
         },
-        "prf_hz": scene.doppler.prf,
+        "prf_hz": settings.prf,
         "pulses": packet.times.len(),
-        "nyquist_mm_per_s": doppler::nyquist(&scene.probe, scene.doppler.prf),
+        "nyquist_mm_per_s": doppler::nyquist(&scene.probe, settings.prf),
+        "baseline": settings.baseline,
+        "inverted": settings.invert,
         "scanlines": [packet.lines.start, packet.lines.end],
         "samples": [packet.samples.start, packet.samples.end],
-        "wall_filter": scene.doppler.wall_filter.to_string(),
+        "wall_filter": settings.wall_filter.to_string(),
         "frequency_mhz": scene.probe.frequency,
         "speed_mm_per_us": scene.probe.speed,
     });
-    if let Some(file) = file {
+    if let (Some(file), Some(echoes)) = (file, echoes) {
+        let found = simulator.correlations().into_diagnostic()?;
         write(file, scene, &packet, &echoes, &found, &said)
             .map_err(|e| miette!("writing {}: {e}", file.display()))?;
     }
@@ -90,7 +92,7 @@ fn write(
     };
     let velocity = of(&|one| one.velocity(nyquist));
     let variance = of(&|one| one.variance(nyquist));
-    let power = of(&|one| one.power);
+    let power = of(&|one| one.power.into());
     let times: Vec<f32> = packet.times.iter().map(|&t| t as f32).collect();
     let pitch = scene.probe.sample_pitch();
     let depth: Vec<f32> = packet.samples.clone().map(|k| (f64::from(k) * pitch) as f32).collect();

@@ -11,7 +11,6 @@ use super::moments::Moment;
 use crate::cli::common;
 use crate::cli::images::Images;
 use insonify::acquire::Recording;
-use insonify::doppler::ColourMode;
 use insonify::exchange::{self, Format, Frames};
 use insonify::output;
 use insonify::output::dicom::About;
@@ -19,8 +18,8 @@ use insonify::output::mp4::Mp4;
 use insonify::output::picture::{colour_png, grey_png};
 use insonify::output::{files, film};
 use insonify::scene::Scene;
-use insonify::sim::Simulator;
 use insonify::sim::facts::{self, Area};
+use insonify::sim::{ColourMode, Simulator};
 
 /// Name of the transform from the probe to the patient's RAS.
 const POSE: &str = "ProbeToReference";
@@ -159,7 +158,7 @@ impl Film {
         let area = area(simulator);
         let mut said = None;
         if let Some((mode, packet)) = coloured_by {
-            let (coloured, facts) = coloured(simulator, scene, mode, index, &area, packet)?;
+            let (coloured, facts) = coloured(simulator, scene, mode, index, packet)?;
             (rgba, said) = (coloured, Some(facts));
         }
         if index == 0 {

@@ -19,6 +19,18 @@ words! {
     }
 }
 
+words! {
+    /// What the colours of velocities show.
+    #[derive(Default)]
+    pub enum VelocityMap {
+        /// Velocity alone, dark to full to light.
+        #[default]
+        Velocity = "velocity",
+        /// Velocity, dark to full, and by green how much it varies: turbulence.
+        Variance = "velocity-variance",
+    }
+}
+
 group! {
     /// Colour Doppler.
     pub struct Doppler in "doppler" {
@@ -27,7 +39,7 @@ group! {
         prf: f64 = 4000.0,
             Facts::quantity(&RATE, 10.0, 1e5).label("PRF").usual(500.0, 12_000.0);
         /// Pulses of a packet, from which a velocity is found.
-        pulses: u32 = 8, Facts::whole(2, 64).label("Packet size").usual(4.0, 16.0);
+        pulses: u32 = 8, Facts::whole(2, Doppler::MOST_PULSES).label("Packet size").usual(4.0, 16.0);
         /// What is taken off the echoes as coming from tissue: the polynomial over the pulses of a packet that fits best.
         wall_filter: WallFilter = WallFilter::Linear, Facts::word::<WallFilter>().label("Wall filter");
         /// Left edge of the box, over the scanlines.
@@ -46,10 +58,30 @@ group! {
         threshold: f64 = 6.0, Facts::quantity(&LEVEL, -60.0, 60.0).label("Threshold").usual(0.0, 20.0);
         /// Grey level of the image, 0 to 1, from which on it stands in front of colour.
         priority: f64 = 0.5, Facts::number(0.0, 1.0).label("Priority");
+        /// Velocity towards the probe in the middle of those that are told apart, over the Nyquist velocity: those from there to a
+        /// Nyquist velocity less and more do not fold over. Zero moves along the colour bar.
+        baseline: f64 = 0.0, Facts::number(-1.0, 1.0).label("Baseline");
+        /// Whether flow towards the probe has the colours of flow away from it: blue.
+        invert: bool = false, Facts::switch().label("Invert");
+        /// Colours of velocities; the second one shows by green how much they vary from pulse to pulse.
+        map: VelocityMap = VelocityMap::Velocity, Facts::word::<VelocityMap>().label("Map");
+        /// Whether power is red towards the probe and blue away from it.
+        directional: bool = false, Facts::switch().label("Directional power");
     }
 }
 
 impl Doppler {
+    /// Most pulses of a packet.
+    pub const MOST_PULSES: u32 = 64;
+
+    /// Highest order of a wall filter's polynomials.
+    pub const MOST_ORDER: u32 = 2;
+
+    /// The lowest and the highest velocity towards the probe that are told apart, over the Nyquist velocity.
+    pub fn velocities(&self) -> [f64; 2] {
+        [self.baseline - 1.0, self.baseline + 1.0]
+    }
+
     /// What is wrong with these settings for a probe: the key at fault, the cause, and the remedy. None where they fit.
     pub fn fault(&self, probe: &Probe) -> Option<(&'static str, String, String)> {
         for (low, high, key) in
