@@ -21,6 +21,15 @@ use crate::settings::Machine;
 /// Time without movement after which the image counts as at rest.
 pub const REST: Duration = Duration::from_millis(150);
 
+/// Fewest pulses of a packet while something moves, where the scene has as many: a velocity takes two, and a wall filter up to
+/// three more.
+const LEAST_PULSES: u32 = 4;
+
+/// Pulses of a packet of which a scene has `own` at a level of the ladder. They become fewer before lines do.
+pub fn pulses(own: u32, level: usize) -> u32 {
+    own.checked_shr(level as u32).unwrap_or(0).max(LEAST_PULSES).min(own)
+}
+
 /// Quality of a picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grade {

@@ -98,8 +98,6 @@ pub struct Scene {
     pub tracker: Tracker,
     /// Blood that flows, at most one flow for an instance.
     pub flows: Vec<Flow>,
-    /// Colour Doppler.
-    pub doppler: Doppler,
     /// Live quality while something moves.
     pub live: Live,
     /// Places of its parts in the scene file.
@@ -141,7 +139,6 @@ impl Scene {
             contact: None,
             tracker: Tracker::default(),
             live: Live::default(),
-            doppler: Doppler::default(),
             flows: Vec::new(),
             origins: Origins::default(),
         }

@@ -94,6 +94,8 @@ settings! {
     imaging: Imaging;
     /// The display chain.
     processing: Processing;
+    /// Colour Doppler.
+    doppler: Doppler;
     /// Pulsed-wave Doppler.
     spectral: Spectral;
 }

@@ -1,7 +1,7 @@
 //! The settings of which the tables on the device are made, and tables of settings used before.
 
 use crate::scene::{Scene, Surface, Tissue, Wire};
-use crate::settings::{Settings, Spectral};
+use crate::settings::{Doppler, Settings, Spectral};
 use crate::tables::Tables;
 
 /// Tables of settings used before, kept because settings come back: live quality changes between levels.
@@ -42,6 +42,7 @@ impl Sources {
         let mut settings = scene.settings.clone();
         // What is no part of the tables.
         settings.simulation.seed = 0;
+        settings.doppler = Doppler::default();
         settings.spectral = Spectral::default();
         Self {
             settings,

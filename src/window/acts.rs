@@ -13,6 +13,7 @@ use super::pads::{self, Word};
 use super::state::State;
 use super::{dual, help};
 use crate::settings::{Group, Imaging, Probe};
+use crate::sim::ColourMode;
 
 /// Carries out the pressed keys, unless a field is being typed into or a dialog is open.
 pub(super) fn apply(ctx: &egui::Context, model: &mut Model, state: &mut State, now: Instant) {
@@ -132,6 +133,14 @@ fn carry_out(
         }
         Action::Layer => {
             model.layer.shown = !model.layer.shown;
+            model.touch(now);
+        }
+        Action::Colour => {
+            model.colour = match model.colour {
+                None => Some(ColourMode::Color),
+                Some(ColourMode::Color) => Some(ColourMode::Power),
+                Some(ColourMode::Power) => None,
+            };
             model.touch(now);
         }
         Action::Panel(at) => {

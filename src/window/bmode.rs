@@ -7,11 +7,13 @@ use super::framing::Framing;
 use super::model::Model;
 use super::picture::Frame;
 use super::place::{NARROW, Place};
-use super::{real, strip, style};
+use super::{colour, real, strip, style};
 use crate::probe::{Probe, ProbeKind};
 
 /// Least height of the grey bar; with less room there is none, points.
 const LEAST_BAR: f32 = 30.0;
+/// Distance of the colour bar from the grey bar above it, points: two lines of text.
+const BETWEEN: f32 = 34.0;
 /// Room for the word at the upper right, with both edges, points.
 const STATE: f32 = 104.0;
 /// Distance of the ruler from the image, points.
@@ -39,7 +41,13 @@ pub(super) fn show(
     }
     texts(&painter, area, frame, held, model, framing);
     ruler(&painter, &place, frame);
-    grey_bar(&painter, area, &place, frame);
+    let bars = bars(area, &place, colour::is_shown(frame, model));
+    if let Some(bar) = bars.first() {
+        grey_bar(&painter, *bar, frame);
+    }
+    if let (Some(bar), Some(coloured)) = (bars.get(1), &frame.coloured) {
+        colour::bar(&painter, *bar, frame, coloured);
+    }
     orientation(&painter, &place, frame);
     real::legend(&painter, area, frame, model);
     real::tissues(&painter, area, frame, model);
@@ -85,6 +93,9 @@ fn texts(
     let mut line = frame.grade.to_string();
     if let (Some(ms), false) = (frame.grade.pace_ms, model.frozen || held) {
         line = format!("{line}   {:.1} frames/s", 1e3 / ms.max(1e-3));
+    }
+    if let Some(said) = colour::said(frame, model) {
+        line = format!("{said}   {line}");
     }
     if model.animated {
         let timed = format!("{:.2} s   {line}", frame.seconds);
@@ -176,26 +187,35 @@ pub(super) fn focus_mark(place: &Place, probe: &Probe) -> Pos2 {
     pos2(seen.right() + RULER - 6.0, seen.y_range().clamp(y))
 }
 
-/// Draws the grey bar by the grey map: white on top, the lower end of the dynamic range at the bottom.
-fn grey_bar(painter: &egui::Painter, area: Rect, place: &Place, frame: &Frame) {
-    let imaging = &frame.settings.imaging;
+/// Places of the grey bar and, with `colours`, of the colour bar below it; none where they have no room.
+fn bars(area: Rect, place: &Place, colours: bool) -> Vec<Rect> {
     let top = place.seen().top() + 16.0;
     // Above the tools with the number at its lower end.
     let room = strip::top(area) - 18.0 - top;
-    let height = (place.seen().height() * 0.4).clamp(60.0, 240.0).min(room);
-    if height < LEAST_BAR {
-        return;
-    }
-    let bar = Rect::from_min_size(pos2(area.left() + 14.0, top), vec2(12.0, height));
-    const STEPS: u32 = 48;
+    let height = (place.seen().height() * 0.4).clamp(60.0, 240.0);
+    let count = 1 + u8::from(colours);
+    let height = height.min((room - BETWEEN * f32::from(count - 1)) / f32::from(count));
+    let at = |number: u8| top + f32::from(number) * (height + BETWEEN);
+    let bar =
+        |number| Rect::from_min_size(pos2(area.left() + 14.0, at(number)), vec2(12.0, height));
+    if height < LEAST_BAR { Vec::new() } else { (0..count).map(bar).collect() }
+}
+
+/// Draws a bar whose sides have the colours of a share of the way from its top to its bottom, with a text above and one below.
+pub(super) fn bar(
+    painter: &egui::Painter,
+    bar: Rect,
+    sides: impl Fn(f32) -> [Color32; 2],
+    [above, below]: [String; 2],
+) {
+    const STEPS: u32 = 64;
     let mut mesh = Mesh::default();
     for i in 0..=STEPS {
         let share = i as f32 / STEPS as f32;
-        let grey = imaging.grey(f64::from(1.0 - share));
-        let colour = Color32::from_gray((255.0 * grey).round() as u8);
+        let [left, right] = sides(share);
         let y = bar.top() + share * bar.height();
-        mesh.colored_vertex(pos2(bar.left(), y), colour);
-        mesh.colored_vertex(pos2(bar.right(), y), colour);
+        mesh.colored_vertex(pos2(bar.left(), y), left);
+        mesh.colored_vertex(pos2(bar.right(), y), right);
         if i > 0 {
             let k = 2 * i;
             mesh.add_triangle(k - 2, k - 1, k);
@@ -210,11 +230,20 @@ fn grey_bar(painter: &egui::Painter, area: Rect, place: &Place, frame: &Frame) {
         egui::StrokeKind::Outside,
     );
     let font = FontId::proportional(10.0);
-    let above = bar.center_top() - vec2(0.0, 3.0);
-    painter.text(above, Align2::CENTER_BOTTOM, "0 dB", font.clone(), style::FAINT);
-    let below = bar.center_bottom() + vec2(0.0, 3.0);
-    let floor = format!("-{:.0}", imaging.dynamic_range);
-    painter.text(below, Align2::CENTER_TOP, floor, font, style::FAINT);
+    let at = bar.center_top() - vec2(0.0, 3.0);
+    painter.text(at, Align2::CENTER_BOTTOM, above, font.clone(), style::FAINT);
+    let at = bar.center_bottom() + vec2(0.0, 3.0);
+    painter.text(at, Align2::CENTER_TOP, below, font, style::FAINT);
+}
+
+/// Draws the grey bar by the grey map: white on top, the lower end of the dynamic range at the bottom.
+fn grey_bar(painter: &egui::Painter, place: Rect, frame: &Frame) {
+    let imaging = &frame.settings.imaging;
+    let grey = |share: f32| {
+        let grey = imaging.grey(f64::from(1.0 - share));
+        [Color32::from_gray((255.0 * grey).round() as u8); 2]
+    };
+    bar(painter, place, grey, ["0 dB".to_owned(), format!("-{:.0}", imaging.dynamic_range)]);
 }
 
 /// Draws the probe's mark, at the side of its first scanline, which is the image's left.

@@ -20,7 +20,6 @@ use crate::output::dicom::{self, About, DicomError, Study};
 use crate::output::film::FilmError;
 use crate::output::movie::MovieError;
 use crate::output::mp4::Mp4Error;
-use crate::output::picture::grey_png;
 pub(super) use clip::{Clip, Format, largest};
 use insonify_lab::exam::{Picture, Report};
 
@@ -189,7 +188,7 @@ impl Captures {
     /// it does not exist.
     pub(super) fn still(&mut self, folder: PathBuf, stem: String, still: Still) {
         self.begin(1, move |_| {
-            let rgba = still.frame.image.read_back()?;
+            let rgba = still.frame.saved().read_back()?;
             let mut claim = Claim::new(&folder, &stem)?;
             let [width, height, _] = still.frame.image.extent();
             let pitch = still.frame.sector.pitch;
@@ -197,7 +196,8 @@ impl Captures {
             let file = claim.add(".png");
             sidecar.insert("file".into(), files::name(&file));
             let text = Value::Object(sidecar.clone()).to_string();
-            let picture = grey_png([width, height], &rgba, pitch, Some(&text));
+            let picture =
+                files::image_png([width, height], &rgba, pitch, Some(&text), &still.frame);
             files::write_new(&file, &picture)?;
             if let Some(shot) = still.marked {
                 let file = claim.add("-marked.png");

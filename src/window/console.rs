@@ -20,7 +20,8 @@ use super::files;
 use super::model::{ELABORATE, Model, Source};
 use super::naming::Wanted;
 use super::panel::{Desk, Dock, OpenPanels, Panel, Row};
-use crate::settings::{self, Group, Member, Visitor};
+use crate::settings::{self, Doppler, Group, Member, Visitor};
+use crate::sim::ColourMode;
 use crate::style::{self, button};
 use poses::Naming;
 
@@ -107,7 +108,18 @@ impl Console {
         section(ui, "Simulation", false, |ui| {
             simulation::show(ui, settings, &desk.common.device, lattice);
         });
-        settings::Settings::each(&mut Others { ui, settings: &mut settings.imaged });
+        let (before, mut colour) = (desk.model.colour, desk.model.colour);
+        let settings = &mut desk.model.settings;
+        settings::Settings::each(&mut Others {
+            ui,
+            settings: &mut settings.imaged,
+            colour: &mut colour,
+        });
+        if colour != before {
+            desk.model.colour = colour;
+            desk.model.touch(now);
+        }
+        let settings = &desk.model.settings;
         if settings.fusion.is_some() {
             section(ui, "Fusion", false, |ui| fusion::show(ui, desk.model, now));
         }
@@ -147,17 +159,37 @@ impl Console {
 struct Others<'s> {
     ui: &'s mut Ui,
     settings: &'s mut settings::Settings,
+    /// What the colours of what flows show.
+    colour: &'s mut Option<ColourMode>,
 }
 
 impl Visitor for Others<'_> {
     fn visit<T: Group>(&mut self, group: Member<T>) {
         if !ELABORATE.contains(&T::TABLE) {
             let (first, rest) = T::TABLE.split_at(1);
+            let colour = (T::TABLE == Doppler::TABLE).then_some(&mut *self.colour);
             section(self.ui, &(first.to_uppercase() + rest), false, |ui| {
+                if let Some(colour) = colour {
+                    switch(ui, colour);
+                }
                 controls::group(ui, T::TABLE, (group.of_mut)(self.settings));
             });
         }
     }
+}
+
+/// The switch of the colours of what flows.
+fn switch(ui: &mut Ui, colour: &mut Option<ColourMode>) {
+    ui.horizontal(|ui| {
+        ui.label("Colours").on_hover_text("What flows in the colour box (G)");
+        for (choice, name, tip) in [
+            (None, "Off", "The image alone"),
+            (Some(ColourMode::Color), "Velocity", "How fast it flows, towards the probe and away"),
+            (Some(ColourMode::Power), "Power", "How much flows"),
+        ] {
+            ui.selectable_value(colour, choice, name).on_hover_text(tip);
+        }
+    });
 }
 
 /// Text of sections that would name what is to be found.

@@ -14,8 +14,8 @@ use super::panel::{Ask, Desk, Dock, Panel, Seen};
 use super::place::Place;
 use super::state::State;
 use super::{
-    beside, body, calipers, cine, deaths, dual, ecg, files, leaving, mmode, naming, notice, offer,
-    saved, strip, style, view3d,
+    beside, body, calipers, cine, colour, deaths, dual, ecg, files, leaving, mmode, naming, notice,
+    offer, saved, strip, style, view3d,
 };
 use crate::settings::Exam;
 
@@ -301,6 +301,12 @@ fn images(
     }
     if let Some(place) = &place {
         beside::show(ui, place, model, now);
+    }
+    if let (Some(place), Some(frame)) = (&place, frame) {
+        colour::the_box(ui, place, &frame.probe, model, now);
+    }
+    if let Some(fault) = colour::fault(model) {
+        notice::badge(ui, "no colours", "What flows cannot be coloured:", &fault);
     }
     if state.prepares && frame.is_some() {
         notice::preparing(ui, state.preparing);

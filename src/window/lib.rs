@@ -18,6 +18,7 @@ mod body;
 mod calipers;
 mod captures;
 mod cine;
+mod colour;
 mod console;
 mod deaths;
 mod dual;

@@ -57,8 +57,8 @@ pub use view3d::{Shown, View3d};
 use super::picture::{Film, Frame};
 use crate::probe::Probe;
 use crate::scene::{NamedPose, Scene, Task};
-use crate::sim::Tracer;
 use crate::sim::fusion::Tint;
+use crate::sim::{ColourMode, Tracer};
 
 /// The state of a session.
 pub struct Model {
@@ -102,6 +102,8 @@ pub struct Model {
     pub real: Real,
     /// The tissues that are seen, in colours.
     pub layer: Layer,
+    /// What flows, in colours; none where they are off.
+    pub colour: Option<ColourMode>,
     /// Tasks of the scene.
     pub tasks: Vec<Task>,
     /// True while a task is under way in an examination: nothing names what is to be found, and nothing leads there.
@@ -151,6 +153,8 @@ pub struct Order {
     pub tint: Option<Tint>,
     /// Opacity of the tissues' colours in a third image, if wanted.
     pub paint: Option<f32>,
+    /// What the colours of what flows show in a fourth image, if wanted.
+    pub colour: Option<ColourMode>,
     /// World from probe, unless a replay moves it.
     pose: DAffine3,
     /// The trajectory that the probe follows.
@@ -226,6 +230,7 @@ impl Model {
             file,
             real: Real::default(),
             layer: Layer::default(),
+            colour: None,
             tasks: scene.tasks.clone(),
             examined: false,
             looked_up: false,
@@ -359,6 +364,7 @@ impl Model {
             settings: self.settings.clone(),
             tint: self.real.tint(),
             paint: self.layer.paint(),
+            colour: self.colour,
             pose: self.pose,
             clock: self.clock,
             replay: self.trajectory.replay.clone(),

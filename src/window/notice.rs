@@ -71,16 +71,22 @@ pub(super) fn recording(ui: &Ui, model: &Model, now: Instant) {
 /// Draws the reason why the scene's files, which have changed, cannot be used, at the image's lower edge.
 pub(super) fn stale(ui: &Ui, problem: Option<&str>) {
     let Some(problem) = problem else { return };
+    let what = "The scene's files have changed and cannot be used; the image goes on as it was:";
+    badge(ui, "stale", what, problem);
+}
+
+/// Draws what is not possible, and why, at the image's lower edge.
+pub(super) fn badge(ui: &Ui, id: &str, what: &str, why: &str) {
     let area = ui.max_rect();
-    Area::new(Id::new("stale"))
+    Area::new(Id::new(id))
         .pivot(Align2::CENTER_BOTTOM)
         .fixed_pos(area.center_bottom() - vec2(0.0, 60.0))
         .constrain_to(area)
         .show(ui.ctx(), |ui| {
             Frame::popup(ui.style()).show(ui, |ui| {
                 ui.set_max_width(440.0);
-                ui.label("The scene's files have changed and cannot be used; the image goes on as it was:");
-                ui.label(RichText::new(problem).color(style::WARN));
+                ui.label(what);
+                ui.label(RichText::new(why).color(style::WARN));
             });
         });
 }

@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use glam::DAffine3;
+use serde_json::{Value, json};
 
 use super::model::Settings;
 use super::model::mmode::{Aim, Column};
@@ -11,8 +12,9 @@ use super::model::sheet::Moment;
 use crate::gpu::{FrameTimings, Image, MemoryUse};
 use crate::live::Grade;
 use crate::probe::Probe;
-use crate::sim::Memory;
 use crate::sim::contact::SkinContact;
+use crate::sim::{ColourMode, Memory};
+use insonify_lab::doppler::nyquist;
 
 /// Place of the image in the probe's space.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,6 +53,32 @@ impl Pixels {
     }
 }
 
+/// An image with what flows in colours.
+#[derive(Clone)]
+pub struct Coloured {
+    /// The image.
+    pub image: Image,
+    /// What the colours show.
+    pub mode: ColourMode,
+    /// Pulses of the packet from which they were made.
+    pub pulses: u32,
+}
+
+impl Coloured {
+    /// What is said of it beside a picture.
+    pub(crate) fn json(&self, frame: &Frame) -> Value {
+        let (probe, doppler) = (&frame.probe, &frame.settings.doppler);
+        json!({
+            "shows": match self.mode {
+                ColourMode::Color => "velocity",
+                ColourMode::Power => "power",
+            },
+            "pulses": self.pulses,
+            "nyquist_mm_per_s": nyquist(probe, doppler.prf),
+        })
+    }
+}
+
 /// A finished picture of the simulation.
 #[derive(Clone)]
 pub struct Frame {
@@ -60,6 +88,8 @@ pub struct Frame {
     pub tinted: Option<Image>,
     /// The same image with the tissues that are seen in their colours; only where asked for.
     pub painted: Option<Image>,
+    /// The same image with what flows in colours; only where asked for and where the settings can be.
+    pub coloured: Option<Coloured>,
     /// Place of the image in the probe's space.
     pub sector: Sector,
     /// The probe that it was made with.
@@ -96,6 +126,11 @@ pub struct Frame {
 }
 
 impl Frame {
+    /// The image as it is saved: with what flows in colours where it has them.
+    pub(crate) fn saved(&self) -> &Image {
+        self.coloured.as_ref().map_or(&self.image, |coloured| &coloured.image)
+    }
+
     /// Pose and time of the frame.
     pub(crate) fn moment(&self) -> Moment {
         Moment { pose: self.pose, seconds: self.seconds }

@@ -1,4 +1,4 @@
-//! The image with marked acquired pixels, or with the tissues in colours, and its legend.
+//! The image with marked acquired pixels, with the tissues in colours, or with what flows, and its legend.
 
 use egui::{Align2, Color32, FontId, Rect, pos2, vec2};
 
@@ -14,9 +14,10 @@ const LEGEND: f32 = 64.0;
 
 /// The image of a frame to be shown.
 pub(super) fn image<'f>(frame: &'f Frame, model: &Model) -> &'f Image {
+    let coloured = frame.coloured.as_ref().filter(|_| model.colour.is_some());
     let painted = frame.painted.as_ref().filter(|_| model.layer.shown);
     let tinted = frame.tinted.as_ref().filter(|_| model.real.shown);
-    painted.or(tinted).unwrap_or(&frame.image)
+    coloured.map(|coloured| &coloured.image).or(painted).or(tinted).unwrap_or(&frame.image)
 }
 
 /// Draws the colours of the tissues of meshes and background below each other at the upper right of `area`.

@@ -194,9 +194,10 @@ impl Tools {
         let Some(wanted) = self.due.take() else {
             return;
         };
-        let Some(frame) = self.cine.shown().cloned() else {
+        let Some(mut frame) = self.cine.shown().cloned() else {
             return;
         };
+        as_shown(&mut frame, model);
         let (folder, stem) = (self.folder.clone(), sidecar::stem(&model.title));
         self.filed = model.sheet.all().iter().cloned().collect();
         match wanted {
@@ -243,7 +244,9 @@ impl Tools {
                 all_settings.push(settings.into());
             }
             last = Some(frame);
-            frames.push((frame.clone(), end));
+            let mut frame = frame.clone();
+            as_shown(&mut frame, model);
+            frames.push((frame, end));
         }
         let largest = captures::largest(&frames).unwrap_or(shown);
         let mut sidecar = self.about(model, largest);
@@ -278,10 +281,10 @@ impl Tools {
             "pose": facts::pose(&frame.pose),
             "quality": frame.grade.json(),
         });
-        match facts {
-            Value::Object(map) => map,
-            _ => unreachable!("made as one"),
-        }
+        let Value::Object(mut map) = facts else { unreachable!("made as one") };
+        let coloured = frame.coloured.as_ref().map(|coloured| coloured.json(frame));
+        map.extend(coloured.map(|facts| ("doppler".to_owned(), facts)));
+        map
     }
 
     /// Adds messages about ended captures.
@@ -329,9 +332,15 @@ impl Tools {
     }
 }
 
+/// Takes the colours of what flows off a frame where the screen does not show them.
+fn as_shown(frame: &mut Frame, model: &Model) {
+    frame.coloured = frame.coloured.take().filter(|_| model.colour.is_some());
+}
+
 /// Bytes of the pictures of a frame.
 fn bytes(frame: &Frame) -> u64 {
-    let images = [Some(&frame.image), frame.tinted.as_ref(), frame.painted.as_ref()];
+    let coloured = frame.coloured.as_ref().map(|coloured| &coloured.image);
+    let images = [Some(&frame.image), frame.tinted.as_ref(), frame.painted.as_ref(), coloured];
     images.into_iter().flatten().map(Image::bytes).sum()
 }
 

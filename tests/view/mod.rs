@@ -4,6 +4,7 @@
 // Shared with the tests of the protocol, which use all of it.
 mod authors;
 mod beside;
+mod colour;
 #[allow(dead_code)]
 mod contact;
 mod desk;

@@ -152,6 +152,7 @@ fn each_section_sets_what_is_saved_and_undo_takes_it_back() {
         "Probe input",
         "Simulation",
         "Processing",
+        "Doppler",
         "Fusion",
         "Registration",
         "Tissues",
@@ -163,6 +164,7 @@ fn each_section_sets_what_is_saved_and_undo_takes_it_back() {
         ("Image", 0, "gain"),
         ("Simulation", 0, "paths"),
         ("Processing", 0, "speckle_reduction"),
+        ("Doppler", 0, "prf"),
         ("Fusion", 0, "blur"),
         ("Tissues", 0, "speed"),
         ("Surfaces", 0, "thickness"),
@@ -185,7 +187,7 @@ fn each_section_sets_what_is_saved_and_undo_takes_it_back() {
         let set = lines(&saved);
         assert!(set != lines(&before.0), "{section}: {saved}");
         assert!(saved.starts_with("# All that"), "{saved}");
-        if !["Tissues", "Surfaces"].contains(&section) {
+        if !["Doppler", "Tissues", "Surfaces"].contains(&section) {
             desk.wait_for("another image", |d| difference(&d.grab(IMAGE), &before.1) > 0.05);
         }
         desk.hold_control(Key::Letter('z'));

@@ -18,10 +18,12 @@ pub struct MovieError {
     pub cause: String,
 }
 
-/// An animated GIF that is being written: 256 greys, played again and again. All frames share one
-/// palette, because some viewers show frames with a palette of their own in black.
+/// An animated GIF that is being written: 256 greys, or half as many and colours, played again and again. All frames share
+/// one palette, because some viewers show frames with a palette of their own in black.
 pub struct Movie {
     path: PathBuf,
+    /// Its palette has colours beside greys.
+    coloured: bool,
     state: State,
     /// Time for which the frames so far are shown, hundredths of a second.
     shown: f64,
@@ -47,11 +49,20 @@ impl Movie {
     /// Errors of the file system.
     pub fn new(path: &Path) -> Result<Self, MovieError> {
         let file = Draft::new(path).map_err(|e| failed(path, e))?;
-        Ok(Self { path: path.to_owned(), state: State::Empty(BufWriter::new(file)), shown: 0.0 })
+        let state = State::Empty(BufWriter::new(file));
+        Ok(Self { path: path.to_owned(), coloured: false, state, shown: 0.0 })
     }
 
-    /// Adds a frame that is shown until `end`, s from the beginning: the red channel of RGBA bytes, row
-    /// by row, of the size of the first one.
+    /// Begins a file whose frames have colours of flow beside greys: reds and blues with more or less green.
+    ///
+    /// # Errors
+    /// Those of [`Self::new`].
+    pub fn coloured(path: &Path) -> Result<Self, MovieError> {
+        Ok(Self { coloured: true, ..Self::new(path)? })
+    }
+
+    /// Adds a frame that is shown until `end`, s from the beginning: RGBA bytes, row by row, of the size of the first one; of
+    /// a grey file their red channel.
     ///
     /// # Errors
     /// Errors of the file system; an image larger than the format allows.
@@ -95,24 +106,52 @@ impl Movie {
         let height = u16::try_from(height).map_err(large)?;
         let mut encoder = match std::mem::replace(&mut self.state, State::Failed) {
             State::Empty(file) => {
-                let greys: Vec<u8> = (0..=255).flat_map(|g| [g; 3]).collect();
-                let mut encoder = Encoder::new(file, width, height, &greys)?;
+                let entry = |index: u8| if self.coloured { colour(index) } else { [index; 3] };
+                let palette: Vec<u8> = (0..=255).flat_map(entry).collect();
+                let mut encoder = Encoder::new(file, width, height, &palette)?;
                 encoder.set_repeat(Repeat::Infinite)?;
                 encoder
             }
             State::Begun(encoder) => encoder,
             State::Failed => return Err(std::io::Error::other("it failed before").into()),
         };
+        let pixels: Vec<u8> = match self.coloured {
+            true => rgba.chunks_exact(4).map(|p| nearest([p[0], p[1], p[2]])).collect(),
+            false => grey(rgba).collect(),
+        };
         encoder.write_frame(&Frame {
             width,
             height,
             delay,
-            buffer: grey(rgba).collect::<Vec<_>>().into(),
+            buffer: pixels.into(),
             ..Frame::default()
         })?;
         self.state = State::Begun(encoder);
         Ok(())
     }
+}
+
+/// Steps of a colour's strength, and of its green.
+const SHADES: u8 = 8;
+
+/// A colour of the palette with colours: every other grey, then reds and blues, each with as many strengths and greens.
+fn colour(index: u8) -> [u8; 3] {
+    let Some(rest) = index.checked_sub(128) else {
+        return [2 * index + index / 64; 3];
+    };
+    let level = |step: u8| (f64::from(step) * 255.0 / f64::from(SHADES - 1)).round() as u8;
+    let [strong, green] = [level(rest % 64 / SHADES), level(rest % SHADES)];
+    if rest < 64 { [strong, green, 0] } else { [0, green, strong] }
+}
+
+/// The entry of that palette that is nearest to a grey, a red or a blue.
+fn nearest([r, g, b]: [u8; 3]) -> u8 {
+    if r == g && g == b {
+        return g / 2;
+    }
+    let step = |level: u8| (f64::from(level) * f64::from(SHADES - 1) / 255.0).round() as u8;
+    let (hue, strong) = if r >= b { (0, r) } else { (1, b) };
+    128 + 64 * hue + SHADES * step(strong) + step(g)
 }
 
 fn failed(path: &Path, cause: impl ToString) -> MovieError {
@@ -143,6 +182,18 @@ mod tests {
             assert!((f64::from(total) - exact).abs() <= 0.5, "{rate}: {total} {exact}");
         }
         assert_eq!(centiseconds(0.0, 0.001), 2);
+    }
+
+    #[test]
+    fn colours_stay_near_what_they_were() {
+        for index in 0..=255 {
+            let [r, g, b] = colour(index);
+            assert_eq!(colour(nearest([r, g, b])), [r, g, b], "{index}");
+        }
+        for pixel in [[60, 0, 0], [255, 200, 0], [0, 30, 133], [0, 230, 255], [77; 3], [255; 3]] {
+            let apart = colour(nearest(pixel)).into_iter().zip(pixel).map(|(a, b)| a.abs_diff(b));
+            assert!(apart.max() <= Some(18), "{pixel:?}");
+        }
     }
 
     #[test]

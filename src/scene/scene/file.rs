@@ -53,7 +53,7 @@ pub use study::{Plan, Question, Scenario, Slice};
 pub use table::{Entry, Key, changes, differing, entries};
 pub use trajectory::load_trajectory;
 
-use crate::settings::{Doppler, suggest};
+use crate::settings::{Settings, suggest};
 use schema::Title;
 
 /// A pair of `overrides` as [`Scene::load`] takes them, from `path=value`.
@@ -147,8 +147,7 @@ impl Scene {
         )?;
         let tracker = tracker::build(&document, &file.tracker.stated)?;
         let live = file.live.stated.get("");
-        let doppler: Doppler = file.doppler.stated.get("");
-        let (probe, spectral) = (&settings.probe, &settings.spectral);
+        let Settings { probe, doppler, spectral, .. } = &settings;
         doppler::fits(&document, "doppler", &file.doppler.stated, doppler.fault(probe))?;
         doppler::fits(&document, "spectral", &file.spectral.stated, spectral.fault(probe))?;
         warnings.extend(tissues.unused());
@@ -177,7 +176,6 @@ impl Scene {
             contact,
             tracker,
             live,
-            doppler,
             flows: Vec::new(),
             origins,
         };

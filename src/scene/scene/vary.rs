@@ -3,7 +3,9 @@
 //! parameters and does not list them; [`SUGGESTED`] are ours.
 
 use crate::settings::units::ANGLE;
-use crate::settings::{Facts, Form, Group, Member, Settings, Spectral, Value, Visitor};
+use crate::settings::{
+    Doppler, Facts, Form, Group, Member, Settings, Spectral, Value, Visitor,
+};
 
 /// Distance from the scene's own value, below and above.
 #[derive(Clone, Copy, Debug)]
@@ -67,8 +69,8 @@ impl Parameter {
         struct All(Vec<Parameter>);
         impl Visitor for All {
             fn visit<T: Group>(&mut self, _: Member<T>) {
-                // A contact sheet has no spectra.
-                if T::TABLE != Spectral::TABLE {
+                // A contact sheet has neither colours nor spectra.
+                if T::TABLE != Doppler::TABLE && T::TABLE != Spectral::TABLE {
                     self.0.extend(numbers::<T>());
                 }
             }

@@ -8,7 +8,6 @@ use crate::output::dicom::About;
 use crate::output::film::Film;
 use crate::output::movie::Movie;
 use crate::output::mp4::{self, Mp4};
-use crate::output::picture::grey_png;
 use crate::picture::Frame;
 
 /// File format of a clip.
@@ -60,7 +59,11 @@ impl Clip {
             Format::Dicom => claim.add(".dcm"),
         };
         let mut reel = match self.format {
-            Format::Gif => Reel::Film(Film::Gif(Movie::new(&target)?)),
+            Format::Gif => {
+                let colours = self.frames.iter().any(|(frame, _)| frame.coloured.is_some());
+                let movie = if colours { Movie::coloured(&target) } else { Movie::new(&target) };
+                Reel::Film(Film::Gif(movie?))
+            }
             Format::Mp4 => {
                 let ends = self.frames.iter().map(|(_, end)| *end);
                 Reel::Film(Film::Mp4(Mp4::new(&target, mp4::rate(ends))))
@@ -99,7 +102,7 @@ impl Reel {
         frame: &Frame,
         size: [u32; 2],
     ) -> Result<(), CaptureError> {
-        let rgba = frame.image.read_back()?;
+        let rgba = frame.saved().read_back()?;
         let [across, down, _] = frame.image.extent();
         let rgba = scaled(rgba, [across, down], size);
         match self {
@@ -107,7 +110,7 @@ impl Reel {
             Self::Sequence(folder) => {
                 let pitch = frame.sector.pitch * f64::from(down) / f64::from(size[1]);
                 let file = folder.join(format!("{index:04}.png"));
-                files::write_new(&file, &grey_png(size, &rgba, pitch, None))?;
+                files::write_new(&file, &files::image_png(size, &rgba, pitch, None, frame))?;
             }
         }
         Ok(())

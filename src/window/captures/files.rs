@@ -8,7 +8,8 @@ use image::{DynamicImage, ImageFormat, RgbaImage};
 use serde_json::Value;
 
 use super::{CaptureError, Sidecar};
-use crate::output;
+use crate::output::{self, picture};
+use crate::picture::Frame;
 
 /// A number that no other capture of a folder has, reserved by its sidecar. The files written under
 /// it are removed unless all are kept.
@@ -116,6 +117,18 @@ pub(super) fn write_next(
 pub(super) fn write_new(path: &Path, bytes: &[u8]) -> Result<(), CaptureError> {
     let opened = OpenOptions::new().write(true).create_new(true).open(path);
     opened.and_then(|mut file| file.write_all(bytes)).map_err(|e| CaptureError::file(path, e))
+}
+
+/// The PNG of a frame's image whose pixels' edges are `pitch` mm, with `text` in it: grey unless it has colours.
+pub(super) fn image_png(
+    size: [u32; 2],
+    rgba: &[u8],
+    pitch: f64,
+    text: Option<&str>,
+    frame: &Frame,
+) -> Vec<u8> {
+    let png = if frame.coloured.is_some() { picture::colour_png } else { picture::grey_png };
+    png(size, rgba, pitch, text)
 }
 
 /// A PNG file in colour, without scale or text.

@@ -57,7 +57,6 @@ pub fn value(scene: &Scene, path: &str) -> Option<Value> {
     let key = |at: usize| parts.get(at..).map(|parts| parts.join("."));
     match parts[0].as_str() {
         "live" => of(&scene.live, &key(1)?),
-        "doppler" => of(&scene.doppler, &key(1)?),
         "tissues" => of(scene.tissues.iter().find(|t| Some(&t.name) == parts.get(1))?, &key(2)?),
         _ => value_of_settings(&scene.settings, path),
     }

@@ -6,12 +6,15 @@ use std::time::Instant;
 
 use super::{Imaged, Taken, Worker, hand_over};
 use crate::engine::News;
-use crate::gpu::Abandon;
+use crate::gpu::{Abandon, FrameTimings, Image};
+use crate::live;
 use crate::look::Pictured;
 use crate::model::{Order, Settings};
-use crate::picture::{Film, Frame, Pixels, Sector};
+use crate::picture::{Coloured, Film, Frame, Pixels, Sector};
 use crate::scene::Scene;
-use crate::sim::{Outputs, Shot, SimError, Simulator, Tracer, image_size};
+use crate::settings::Doppler;
+use crate::sim::{ColourMode, Outputs, Shot, SimError, Simulator, Tracer, image_size};
+use insonify_lab::doppler;
 
 /// Share of the image in the budget while the 3D view is open.
 const IMAGE_SHARE: f64 = 0.8;
@@ -160,7 +163,16 @@ impl Worker {
             hand_over(&self.shared, &self.wake, News::Preparing(COMPILING));
         }
         simulator.frames_into(scene, &[Shot::of(scene, index)], &outputs)?;
-        let timings = simulator.wait()?.pop().unwrap_or_default();
+        let mut timings = simulator.wait()?.pop().unwrap_or_default();
+        let coloured = match order.colour.filter(|_| scene.doppler.fault(&scene.probe).is_none()) {
+            Some(mode) => {
+                let image = self.ring.free(image_size(scene))?;
+                let pulses = live::pulses(scene.doppler.pulses, level);
+                colour(simulator, scene, index, mode, pulses, &image, &mut timings)?;
+                Some(Coloured { image, mode, pulses })
+            }
+            None => None,
+        };
         let wall = began.elapsed();
         if !at_rest {
             self.took = wall;
@@ -197,6 +209,7 @@ impl Worker {
             image,
             tinted: tinted.map(|(image, _)| image),
             painted: painted.map(|(image, _)| image),
+            coloured,
             probe: order.settings.probe.clone(),
             grade: self.pace.grade(level, scene, at_rest),
             settings,
@@ -215,6 +228,28 @@ impl Worker {
         };
         Ok((frame, film))
     }
+}
+
+/// Colours the last image by a packet of so many pulses; its times are those of the image, too.
+fn colour(
+    simulator: &mut Simulator,
+    scene: &Scene,
+    index: u32,
+    mode: ColourMode,
+    pulses: u32,
+    image: &Image,
+    timings: &mut FrameTimings,
+) -> Result<(), SimError> {
+    let settings = Doppler { pulses, ..scene.doppler.clone() };
+    simulator.make_packet(scene, index, &doppler::packet(&scene.probe, &settings))?;
+    let packet = simulator.wait()?.pop().unwrap_or_default();
+    simulator.colour(scene, mode, Some(image))?;
+    let colours = simulator.wait()?.pop().unwrap_or_default();
+    if !packet.passes.is_empty() {
+        timings.passes.push(("packet".to_owned(), packet.total_ms()));
+    }
+    timings.passes.extend(colours.passes);
+    Ok(())
 }
 
 /// Panics once the file that a test names is there, and takes it away.
