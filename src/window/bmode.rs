@@ -14,6 +14,8 @@ use crate::probe::{Probe, ProbeKind};
 const LEAST_BAR: f32 = 30.0;
 /// Distance of the colour bar from the grey bar above it, points: two lines of text.
 const BETWEEN: f32 = 34.0;
+/// Height of a line of text below a bar, points.
+const UNIT: f32 = 12.0;
 /// Room for the word at the upper right, with both edges, points.
 const STATE: f32 = 104.0;
 /// Distance of the ruler from the image, points.
@@ -194,7 +196,9 @@ fn bars(area: Rect, place: &Place, colours: bool) -> Vec<Rect> {
     let room = strip::top(area) - 18.0 - top;
     let height = (place.seen().height() * 0.4).clamp(60.0, 240.0);
     let count = 1 + u8::from(colours);
-    let height = height.min((room - BETWEEN * f32::from(count - 1)) / f32::from(count));
+    // The unit of velocities stands below their bar.
+    let room = if colours { room - BETWEEN - UNIT } else { room };
+    let height = height.min(room / f32::from(count));
     let at = |number: u8| top + f32::from(number) * (height + BETWEEN);
     let bar =
         |number| Rect::from_min_size(pos2(area.left() + 14.0, at(number)), vec2(12.0, height));

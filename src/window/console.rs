@@ -181,7 +181,7 @@ impl Visitor for Others<'_> {
 /// The switch of the colours of what flows.
 fn switch(ui: &mut Ui, colour: &mut Option<ColourMode>) {
     ui.horizontal(|ui| {
-        ui.label("Colours").on_hover_text("What flows in the colour box (G)");
+        ui.label("Colours").on_hover_text("What flows in the colour box (F5)");
         for (choice, name, tip) in [
             (None, "Off", "The image alone"),
             (Some(ColourMode::Color), "Velocity", "How fast it flows, towards the probe and away"),

@@ -39,8 +39,11 @@ speed = "30 cm/s"
 const IMAGE: [u16; 4] = [200, 100, 560, 540];
 const MIDDLE: (u16, u16) = (482, 360);
 
-/// Colours of the box in the window, and of warnings.
-const ACCENT: [u8; 3] = [92, 176, 196];
+/// The key of the colours: F5.
+const COLOURS: Key = Key::Symbol(0xffc2);
+
+/// Colours of the box's corners, without the pointer over it and with it; colour of warnings.
+const CORNERS: [[u8; 3]; 2] = [[92, 176, 196], [208, 212, 216]];
 const WARN: [u8; 3] = [232, 170, 84];
 
 fn open(scene: &str, arguments: &[&str]) -> Option<Desk> {
@@ -68,6 +71,14 @@ fn exactly(pixels: &[u8], colour: [u8; 3]) -> usize {
     pixels.chunks_exact(3).filter(|pixel| *pixel == colour).count()
 }
 
+/// Place of the box's right edge in a part of the display with the image: the middle of its last corners.
+fn right_edge(pixels: &[u8]) -> Option<u16> {
+    let is_corner = |pixel: &[u8]| CORNERS.iter().any(|colour| pixel == colour);
+    let columns = pixels.chunks_exact(3).zip(0u32..).filter(|(pixel, _)| is_corner(pixel));
+    let last = columns.map(|(_, at)| at % u32::from(IMAGE[2])).max()?;
+    Some(IMAGE[0] + last as u16 - 3)
+}
+
 /// The value of a key in the scene file.
 fn value(desk: &Desk, key: &str) -> Option<f64> {
     let text = desk.scene();
@@ -87,7 +98,7 @@ fn what_flows_is_coloured_by_a_key_saved_so_and_costs_nothing_when_off() {
             return;
         };
         if on {
-            desk.press(Key::Letter('g'));
+            desk.press(COLOURS);
             let away = |d: &mut Desk| {
                 let [red, blue] = colours(&d.grab(IMAGE));
                 blue > 3000 && blue > 4 * red
@@ -102,15 +113,15 @@ fn what_flows_is_coloured_by_a_key_saved_so_and_costs_nothing_when_off() {
             let saved = image::open(folder.path().join("captures/vessel-0001.png"));
             let [red, blue] = colours(&saved.expect("a picture").to_rgb8());
             assert!(blue > 1000 && blue > 4 * red, "{red} {blue}");
-            desk.press(Key::Letter('g'));
+            desk.press(COLOURS);
             let loud = |d: &mut Desk| {
                 let [red, blue] = colours(&d.grab(IMAGE));
                 red > 3000 && blue < red / 50
             };
             desk.wait_for("power, red", loud);
-            desk.press(Key::Letter('g'));
+            desk.press(COLOURS);
             desk.wait_for("no colours", |d| colours(&d.grab(IMAGE)) == [0, 0]);
-            desk.press(Key::Letter('g'));
+            desk.press(COLOURS);
             desk.wait_for("colours again", away);
         }
         desk.quit();
@@ -132,8 +143,8 @@ fn the_box_is_moved_and_resized_by_the_pointer_and_undone() {
     };
     // Blood stands still for it.
     desk.press(Key::Letter('p'));
-    desk.press(Key::Letter('g'));
-    desk.wait_for("the box", |d| exactly(&d.grab(IMAGE), ACCENT) > 500);
+    desk.press(COLOURS);
+    desk.wait_for("the box", |d| right_edge(&d.grab(IMAGE)).is_some());
     let (x, y) = MIDDLE;
     desk.drag(MIDDLE, (x + 60, y + 30));
     desk.hold_control(Key::Letter('s'));
@@ -142,10 +153,7 @@ fn the_box_is_moved_and_resized_by_the_pointer_and_undone() {
         ["left", "right", "top", "bottom"].map(|key| value(&desk, key).expect(key));
     assert!((right - left - 0.6).abs() < 2e-3 && (bottom - top - 0.6).abs() < 2e-3);
     assert!(top > 0.22 && top < 0.3, "{top}");
-    // Its right edge: the last of its pixels in the middle row.
-    let row = desk.settle([200, y, 560, 1]);
-    let last = row.chunks_exact(3).rposition(|pixel| pixel == ACCENT).expect("an edge");
-    let edge = 200 + last as u16;
+    let edge = right_edge(&desk.settle(IMAGE)).expect("corners");
     desk.drag((edge, y), (edge - 80, y));
     desk.hold_control(Key::Letter('s'));
     desk.wait_for("a narrower box", |d| value(d, "right").is_some_and(|now| now < right - 0.05));
@@ -174,7 +182,7 @@ fn settings_that_cannot_be_coloured_say_why_and_the_image_goes_on() {
     let lower = [300, 500, 600, 180];
     desk.wait_for("an image", |d| brightness(&d.grab([60, 100, 400, 400])) > 1.0);
     assert_eq!(exactly(&desk.grab(lower), WARN), 0);
-    desk.press(Key::Letter('g'));
+    desk.press(COLOURS);
     desk.wait_for("the reason", |d| exactly(&d.grab(lower), WARN) > 30);
     let before = desk.grab([60, 100, 400, 300]);
     desk.press(Key::Letter('-'));
