@@ -164,7 +164,8 @@ fn each_section_sets_what_is_saved_and_undo_takes_it_back() {
         ("Image", 0, "gain"),
         ("Simulation", 0, "paths"),
         ("Processing", 0, "speckle_reduction"),
-        ("Doppler", 0, "prf"),
+        // Before it stands the switch, whose choice is as bright.
+        ("Doppler", 1, "prf"),
         ("Fusion", 0, "blur"),
         ("Tissues", 0, "speed"),
         ("Surfaces", 0, "thickness"),
@@ -187,7 +188,8 @@ fn each_section_sets_what_is_saved_and_undo_takes_it_back() {
         let set = lines(&saved);
         assert!(set != lines(&before.0), "{section}: {saved}");
         assert!(saved.starts_with("# All that"), "{saved}");
-        if !["Doppler", "Tissues", "Surfaces"].contains(&section) {
+        // Colours are off, and in this scene the number of paths changes nothing.
+        if !["Simulation", "Doppler", "Tissues", "Surfaces"].contains(&section) {
             desk.wait_for("another image", |d| difference(&d.grab(IMAGE), &before.1) > 0.05);
         }
         desk.hold_control(Key::Letter('z'));

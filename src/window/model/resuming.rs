@@ -48,6 +48,7 @@ impl Model {
         (self.clock, self.frozen) = (old.clock, old.frozen);
         self.real = old.real;
         self.layer = old.layer;
+        self.colour = old.colour;
         self.view3d.resume(&old.view3d);
         if let (Some(hold), Some(before)) = (&mut self.hold, &old.hold) {
             (hold.stays, hold.press) = (before.stays, before.press);
