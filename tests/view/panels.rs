@@ -153,6 +153,7 @@ fn each_section_sets_what_is_saved_and_undo_takes_it_back() {
         "Simulation",
         "Processing",
         "Doppler",
+        "Spectral",
         "Fusion",
         "Registration",
         "Tissues",
@@ -164,8 +165,8 @@ fn each_section_sets_what_is_saved_and_undo_takes_it_back() {
         ("Image", 0, "gain"),
         ("Simulation", 0, "paths"),
         ("Processing", 0, "speckle_reduction"),
-        // Before it stands the switch, whose choice is as bright.
-        ("Doppler", 1, "prf"),
+        // Before it stands the switch, whose choice is as bright, and as high as two rails.
+        ("Doppler", 2, "prf"),
         ("Fusion", 0, "blur"),
         ("Tissues", 0, "speed"),
         ("Surfaces", 0, "thickness"),

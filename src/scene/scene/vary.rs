@@ -3,9 +3,7 @@
 //! parameters and does not list them; [`SUGGESTED`] are ours.
 
 use crate::settings::units::ANGLE;
-use crate::settings::{
-    Doppler, Facts, Form, Group, Member, Settings, Spectral, Value, Visitor,
-};
+use crate::settings::{Doppler, Facts, Form, Group, Member, Settings, Spectral, Value, Visitor};
 
 /// Distance from the scene's own value, below and above.
 #[derive(Clone, Copy, Debug)]
