@@ -246,3 +246,66 @@ fn sequences_of_trackers_of_others_are_read() {
         assert!(found.iter().any(|f| f.poses.values().any(|p| p.is_ok())), "{file}");
     }
 }
+
+/// Another device's transducer, a transform stated twice (PLUS takes the later one), bodies that are alike, letters in Latin-1.
+#[test]
+fn a_device_set_is_read_as_plus_reads_it() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let folder = folder.path();
+    device_set(folder);
+    tracker_only(folder);
+    let plain = std::fs::read_to_string(folder.join("set.xml")).expect("text");
+    let made = |text: &[u8]| -> String {
+        std::fs::write(folder.join("set.xml"), text).expect("written");
+        let args = ["import", "set.xml", "-o", "out", "--force", "--sequence", "track.igs.mha"];
+        let (done, said) = insonify(folder, &args);
+        assert!(done, "{said}");
+        let (passed, said) = insonify(folder, &["check", "out/scene.toml"]);
+        assert!(passed, "{said}");
+        std::fs::read_to_string(folder.join("out/scene.toml")).expect("a scene")
+    };
+    let scene = made(plain.as_bytes());
+    let other = r#"<Device Id="Other"><ScanConversion TransducerGeometry="CURVILINEAR" RadiusStartMm="14"
+        RadiusStopMm="48" ThetaStartDeg="-36" ThetaStopDeg="36" TransducerCenterPixel="30 5"
+        OutputImageSpacingMmPerPixel="0.2 0.2"/></Device><Device Id="VideoDevice""#;
+    assert_eq!(made(plain.replace("<Device Id=\"VideoDevice\"", other).as_bytes()), scene);
+    let wrong = sixteen(DAffine3::from_translation(DVec3::splat(90.0)));
+    let twice = format!(
+        "<Transform From=\"Image\" To=\"Probe\" Matrix=\"{wrong}\" /> <Transform From=\"Image\""
+    );
+    assert_eq!(made(plain.replace("<Transform From=\"Image\"", &twice).as_bytes()), scene);
+    let begin = plain.find("<SpatialModel Name=\"Ball\"").expect("the ball");
+    let end = begin + plain[begin..].find("/>").expect("its end") + 2;
+    let alike = format!("{}{}{}", &plain[..end], &plain[begin..end], &plain[end..]);
+    assert!(made(alike.as_bytes()).contains("[tissues.plus_ball_2]"));
+    let latin = plain.replace("A ball in a bath", "K\u{fc}gelchen");
+    let latin = format!("<?xml version=\"1.0\" encoding=\"ISO-8859-1\"?>\n{latin}");
+    let bytes: Vec<u8> = latin.chars().map(|c| u8::try_from(c).expect("Latin-1")).collect();
+    assert!(made(&bytes).contains("K\u{fc}gelchen"));
+    // The same bytes without a word of their encoding.
+    let undeclared = bytes.splitn(2, |&byte| byte == b'\n').nth(1).expect("a second line");
+    std::fs::write(folder.join("set.xml"), undeclared).expect("written");
+    let (done, said) = insonify(folder, &["import", "set.xml", "-o", "out", "--force"]);
+    assert!(!done && said.contains("UTF-8") && said.contains("set.xml:3"), "{said}");
+}
+
+/// A fault of the simulator is no reason to write poses of something else.
+#[test]
+fn a_trajectory_by_a_device_set_with_a_fault_is_refused() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let folder = folder.path();
+    device_set(folder);
+    tracker_only(folder);
+    let plain = std::fs::read_to_string(folder.join("set.xml")).expect("text");
+    for (from, to, said_of) in [
+        ("SoundVelocityMPerSec=\"1540\"", "SoundVelocityMPerSec=\"1.540\"", "SoundVelocityMPerSec"),
+        ("ImagingDepthMm=\"60.0\"", "", "ImagingDepthMm"),
+        ("<ScanConversion", "<ScanConverter", "ScanConversion"),
+    ] {
+        std::fs::write(folder.join("set.xml"), plain.replace(from, to)).expect("written");
+        let args = ["import", "track.igs.mha", "-o", "way.csv", "--config", "set.xml"];
+        let (done, said) = insonify(folder, &args);
+        assert!(!done && said.contains(said_of), "{said}");
+        assert!(!folder.join("way.csv").exists());
+    }
+}

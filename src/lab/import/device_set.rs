@@ -1,6 +1,6 @@
 //! A device set of PLUS made into a scene.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::f64::consts::LN_10;
 use std::path::{Path, PathBuf};
 
@@ -91,7 +91,7 @@ pub fn import(
         let file = model.file.as_ref().expect("bodies have files");
         let part = Part {
             name: model.name.clone(),
-            tissue: tissue_name(&set, model),
+            tissue: model.tissue.clone(),
             priority: n as i32,
             origin: file.display().to_string(),
             known: true,
@@ -135,20 +135,6 @@ fn find(config: &Path, model: &Model) -> Result<PathBuf, FileError> {
     }
 }
 
-/// Name of a model's tissue: its own, where no other model has it.
-fn tissue_name(set: &DeviceSet, model: &Model) -> String {
-    let plain = |name: &str| -> String {
-        let letters = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' });
-        format!("plus_{}", letters.collect::<String>().to_lowercase())
-    };
-    let own = plain(&model.name);
-    let before = set.models.iter().take_while(|m| *m != model).filter(|m| plain(&m.name) == own);
-    match before.count() {
-        0 => own,
-        n => format!("{own}_{}", n + 1),
-    }
-}
-
 fn text(set: &DeviceSet, draft: &Draft, placed: &Placed, issues: &[Issue]) -> String {
     let file = draft.source_name();
     let mut out = format!(
@@ -165,8 +151,7 @@ fn text(set: &DeviceSet, draft: &Draft, placed: &Placed, issues: &[Issue]) -> St
     let background = set.models.iter().rev().find(|m| m.file.is_none());
     out += &match background {
         Some(model) => {
-            let tissue = tissue_name(set, model);
-            format!("# The model without a mesh.\nbackground = \"{tissue}\"\n\n")
+            format!("# The model without a mesh.\nbackground = \"{}\"\n\n", model.tissue)
         }
         None => "background = \"water\"\n\n".to_owned(),
     };
@@ -174,12 +159,11 @@ fn text(set: &DeviceSet, draft: &Draft, placed: &Placed, issues: &[Issue]) -> St
     out += &tracker(set);
     out += "# Materials of the configuration. Its backscatter is a share of what is absorbed: the level is that of\n\
             # attenuation times share over PLUS's default. Surfaces and texture are those of liver.\n";
-    for model in &set.models {
-        let name = tissue_name(set, model);
-        let around = model.file.is_none() && background == Some(model);
-        if !around && !draft.parts.iter().any(|p| p.tissue == name) {
-            continue;
-        }
+    let used: HashSet<&str> = (draft.parts.iter().map(|part| part.tissue.as_str()))
+        .chain(background.map(|model| model.tissue.as_str()))
+        .collect();
+    for model in set.models.iter().filter(|model| used.contains(model.tissue.as_str())) {
+        let name = &model.tissue;
         let level = 10.0 * (model.attenuation * model.backscatter / USUAL).ln() / LN_10;
         let level = match level > -60.0 {
             true => format!("{:.1}", level.min(60.0)),

@@ -5,7 +5,7 @@
 //! without a file is everywhere. Scanlines lie in the plane of the image, whose pixels `ImageTo...` takes to mm:
 //! the size of a pixel there and `OutputImageSpacingMmPerPixel`, by which the transducer is laid out in pixels, may differ.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
@@ -37,6 +37,8 @@ pub struct DeviceSet {
 pub struct Model {
     /// Its name.
     pub name: String,
+    /// Name of its tissue in the scene; no two models have the same.
+    pub tissue: String,
     /// Its mesh; the one without is around all others.
     pub file: Option<PathBuf>,
     /// Frame of the object, the reference where none is stated.
@@ -123,6 +125,20 @@ impl DeviceSet {
     /// # Errors
     /// It is no XML, has no simulator, or one without what a scene needs.
     pub fn load(path: &Path) -> Result<Self, FileError> {
+        Self::simulated(path)?.ok_or_else(|| {
+            FileError::file(
+                path,
+                "has no element `vtkPlusUsSimulatorAlgo`: it simulates nothing",
+                "give the configuration of a device of Type=\"UsSimulator\"",
+            )
+        })
+    }
+
+    /// Reads a configuration; none of one without a simulator.
+    ///
+    /// # Errors
+    /// It is no XML, or has a simulator without what a scene needs.
+    pub fn simulated(path: &Path) -> Result<Option<Self>, FileError> {
         let text = plus::text(path)?;
         let document = plus::parse(path, &text)?;
         let root = Element::root(path, &document);
@@ -130,34 +146,32 @@ impl DeviceSet {
         let mut simulators =
             ["vtkPlusUsSimulatorAlgo", "vtkUsSimulatorAlgo"].map(|name| root.named(name).next());
         let Some(simulator) = simulators.iter_mut().find_map(Option::take) else {
-            return Err(FileError::file(
-                path,
-                "has no element `vtkPlusUsSimulatorAlgo`: it simulates nothing",
-                "give the configuration of a device of Type=\"UsSimulator\"",
-            ));
+            return Ok(None);
         };
-        let Some(scan) = root.named("ScanConversion").next() else {
+        // That of another device is another transducer.
+        let Some(scan) = simulator.named("ScanConversion").next() else {
             return Err(
                 simulator.error("has no element `ScanConversion`", "add it: the transducer")
             );
         };
+        let mut names = TissueNames::default();
         let models: Result<Vec<_>, _> = simulator
             .named("SpatialModel")
             .enumerate()
-            .map(|(n, found)| model(&found, n))
+            .map(|(n, found)| model(&found, n, &mut names))
             .collect();
         let own = |name: &str, otherwise: &str| {
             simulator.node.attribute(name).unwrap_or(otherwise).to_owned()
         };
         let name = root.named("DeviceSet").next().and_then(|set| set.node.attribute("Name"));
-        Ok(Self {
+        Ok(Some(Self {
             name: name.map(str::to_owned),
             image: own("ImageCoordinateFrame", "Image"),
             reference: own("ReferenceCoordinateFrame", "Reference"),
             transforms,
             models: models?,
             transducer: transducer(&simulator, &scan)?,
-        })
+        }))
     }
 
     /// The transform from a frame to the reference, by these poses and what always holds.
@@ -216,11 +230,36 @@ fn length(element: &Element, name: &str) -> Result<f64, FileError> {
     number(element, name, 0.0, 0.01..=1000.0)
 }
 
+/// Names of tissues that are taken, and how often each was wanted.
+#[derive(Default)]
+struct TissueNames {
+    taken: HashSet<String>,
+    wanted: HashMap<String, usize>,
+}
+
+impl TissueNames {
+    /// A name for the tissue of a model.
+    fn add(&mut self, model: &str) -> String {
+        let letters = model.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' });
+        let own = format!("plus_{}", letters.collect::<String>().to_lowercase());
+        let count = self.wanted.entry(own.clone()).or_default();
+        loop {
+            *count += 1;
+            let name = if *count == 1 { own.clone() } else { format!("{own}_{count}") };
+            if self.taken.insert(name.clone()) {
+                return name;
+            }
+        }
+    }
+}
+
 /// PLUS's own values where none is given.
-fn model(element: &Element, n: usize) -> Result<Model, FileError> {
+fn model(element: &Element, n: usize, names: &mut TissueNames) -> Result<Model, FileError> {
     let own = |name: &str| element.node.attribute(name).filter(|v| !v.is_empty());
+    let name = own("Name").map_or_else(|| format!("model {}", n + 1), str::to_owned);
     Ok(Model {
-        name: own("Name").map_or_else(|| format!("model {}", n + 1), str::to_owned),
+        tissue: names.add(&name),
+        name,
         file: own("ModelFile").map(PathBuf::from),
         frame: own("ObjectCoordinateFrame").map(str::to_owned),
         object_from_model: element.matrix("ModelToObjectTransform")?.unwrap_or(DAffine3::IDENTITY),

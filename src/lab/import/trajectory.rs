@@ -36,17 +36,17 @@ pub struct Naming {
 }
 
 /// The poses of a sequence by the names of their transforms. With a configuration of PLUS its transforms join them;
-/// where it has a transducer, the rows are poses of its face, else of the tool, whose axes then are the probe's.
+/// where it has a simulator, the rows are poses of its transducer's face, else of the tool, whose axes then are the probe's.
 ///
 /// # Errors
-/// The fault of a file; frames that nothing connects; no pose that is valid.
+/// The fault of a file, also of the simulator; frames that nothing connects; no pose that is valid.
 pub fn import(
     path: &Path,
     config: Option<&Path>,
     naming: &Naming,
 ) -> Result<Trajectory, FileError> {
     let frames = track(path)?;
-    let set = config.map(DeviceSet::load).and_then(Result::ok);
+    let set = config.map(DeviceSet::simulated).transpose()?.flatten();
     let transforms = match (&set, config) {
         (Some(set), _) => set.transforms.clone(),
         (None, Some(config)) => plus::definitions(config)?,

@@ -26,7 +26,18 @@ pub struct Element<'d> {
 /// The fault of the file.
 pub fn text(path: &Path) -> Result<String, FileError> {
     let bytes = issue::read(path, MAX_CONFIG, "give a configuration of PLUS")?;
-    Ok(String::from_utf8_lossy(&bytes).into_owned())
+    let declared = String::from_utf8_lossy(&bytes[..bytes.len().min(200)]).to_ascii_lowercase();
+    String::from_utf8(bytes).or_else(|fault| {
+        let (good, bytes) = (fault.utf8_error().valid_up_to(), fault.into_bytes());
+        // Latin-1 has the first 256 characters of Unicode.
+        let latin = ["\"iso-8859-1\"", "'iso-8859-1'", "\"latin1\"", "'latin1'"];
+        if latin.iter().any(|name| declared.contains(&format!("encoding={name}"))) {
+            return Ok(bytes.into_iter().map(char::from).collect());
+        }
+        let line = 1 + bytes[..good].iter().filter(|&&byte| byte == b'\n').count();
+        let message = "has a character that is no UTF-8, and does not say that it is in ISO-8859-1";
+        Err(FileError::line(path, line, message, "save it as UTF-8"))
+    })
 }
 
 /// The XML of a configuration.

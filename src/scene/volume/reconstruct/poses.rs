@@ -22,8 +22,10 @@ struct Step<'t> {
 }
 
 impl Transforms {
-    /// Adds the transform of points in `from` to points in `to`.
+    /// Adds the transform of points in `from` to points in `to`, in the place of one between them that there is already, as
+    /// PLUS does (vtkIGSIOTransformRepository, SetTransform).
     pub fn add(&mut self, from: &str, to: &str, transform: DAffine3) {
+        self.fixed.retain(|(a, b, _)| (a.as_str(), b.as_str()) != (from, to));
         self.fixed.push((from.to_owned(), to.to_owned(), transform));
     }
 
