@@ -82,3 +82,26 @@ fn a_patients_organs_become_a_scene() {
     let (passed, said) = insonify(folder.path(), &["check", "out/scene.toml"]);
     assert!(passed && said.contains("0 errors"), "{said}");
 }
+
+/// Skins of scans end where the scan ends, at the top and at the bottom.
+#[test]
+fn an_open_skin_is_closed_so_that_a_probe_can_be_held_to_it() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let folder = folder.path();
+    let organs = folder.join("organs");
+    std::fs::create_dir(&organs).expect("made");
+    let write =
+        |name: &str, text: String| std::fs::write(organs.join(name), text).expect("written");
+    let mut tube = shapes::cylinder(120.0, 300.0, 64);
+    let inner = |t: &[u32; 3]| {
+        let ends = t.iter().filter(|&&i| tube.positions[i as usize][..2] == [0.0, 0.0]);
+        ends.count() == 0
+    };
+    tube.triangles = tube.triangles.iter().copied().filter(|t| inner(t)).collect();
+    write("skin.obj", obj(&tube, DVec3::ZERO));
+    write("liver.obj", obj(&shapes::sphere(40.0, 3), DVec3::new(0.0, 30.0, 0.0)));
+    let (done, said) = insonify(folder, &["import", "organs", "-o", "out"]);
+    assert!(done && said.contains("the skin had 2 openings, which were closed flat"), "{said}");
+    let (passed, said) = insonify(folder, &["check", "out/scene.toml"]);
+    assert!(passed && said.contains("0 errors"), "{said}");
+}

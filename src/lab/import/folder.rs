@@ -179,7 +179,22 @@ fn of_meshes(
     let surface = match skin {
         Some(n) => {
             draft.skin = Some(format!("{}.", name_of(&organs[n].file)));
-            organs[n].surface.clone()
+            let mut surface = organs[n].surface.clone();
+            // A probe is held to what has an inside.
+            let (loops, _) = topology::cap(&organs[n].file, &mut surface);
+            if !loops.is_empty() {
+                let openings = loops.len();
+                draft.remarks.push(format!(
+                    "the skin had {openings} openings, which were closed flat, so that a probe can be held to it"
+                ));
+            }
+            if topology::open_count(&surface) > 0 {
+                let message = "is the skin, and does not close even with its openings capped";
+                let remedy =
+                    "close it in the modeller, or leave it out: one is put around the others then";
+                return Err(FileError::file(&organs[n].file, message, remedy));
+            }
+            surface
         }
         None => {
             draft.skin = Some(format!(

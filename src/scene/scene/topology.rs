@@ -134,6 +134,11 @@ pub fn has_area(triangle: [u32; 3], positions: &[[f32; 3]]) -> bool {
     (b - a).cross(c - a).length_squared() != 0.0
 }
 
+/// Number of edges at which a welded soup does not close.
+pub fn open_count(soup: &Soup) -> usize {
+    Edges::of(soup).open().count()
+}
+
 /// Directed open edges: from vertex to vertex in their triangle's direction.
 fn open_edges(soup: &Soup) -> Vec<[u32; 2]> {
     let edges = Edges::of(soup);
