@@ -51,7 +51,7 @@ pub(super) fn apply_pads(word: &Word, model: &mut Model, state: &mut State, now:
             Press::Gain(by) => Action::Gain(by),
             Press::Depth(by) => Action::Depth(by),
             Press::Home => {
-                model.place_probe(Source::Pad, model.home, now);
+                model.go_home(Source::Pad, now);
                 continue;
             }
         };
@@ -111,7 +111,7 @@ fn carry_out(
             model.touch(now);
         }
         Action::Play => {}
-        Action::Home => model.place_probe(Source::Keyboard, model.home, now),
+        Action::Home => model.go_home(Source::Keyboard, now),
         Action::Record => leaving::record(model, state, now),
         Action::Replay => model.replay(now),
         Action::Undo => return model.undo(now),

@@ -232,7 +232,7 @@ fn actions(ui: &mut Ui, model: &mut Model, now: Instant) {
             model.note(&before, now);
         }
         if button(ui, "Home", "Put the probe where the scene file has it (Home)") {
-            model.place_probe(Source::Pointer, model.home, now);
+            model.go_home(Source::Pointer, now);
         }
     });
 }

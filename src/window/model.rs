@@ -269,6 +269,14 @@ impl Model {
         self.settle(source.name(), pose, now);
     }
 
+    /// Puts the probe where the scene file has it. In an examination it stays: what is to be found may lie there.
+    pub fn go_home(&mut self, source: Source, now: Instant) {
+        if !self.examined {
+            self.looked_up = true;
+            self.place_probe(source, self.home, now);
+        }
+    }
+
     /// Takes the pose of the tracker's `tool` (world from probe); the probe goes there unless another
     /// device has moved it since.
     pub fn track(&mut self, tool: &str, pose: DAffine3, now: Instant) {

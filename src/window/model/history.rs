@@ -131,9 +131,10 @@ impl Model {
         self.history.hold(held);
     }
 
-    /// Goes back by one change, if there is one.
+    /// Goes back by one change, if there is one. In an examination the probe does not go back: it may have been where it is to go.
     pub fn undo(&mut self, now: Instant) {
-        if let Some(step) = self.history.past.pop() {
+        let examined = self.examined;
+        if let Some(step) = self.history.past.pop_if(|step| may_go(examined, step)) {
             let undone = self.put(step, now);
             self.history.future.push(undone);
         }
@@ -141,7 +142,8 @@ impl Model {
 
     /// Goes forward again.
     pub fn redo(&mut self, now: Instant) {
-        if let Some(step) = self.history.future.pop() {
+        let examined = self.examined;
+        if let Some(step) = self.history.future.pop_if(|step| may_go(examined, step)) {
             let before = self.put(step, now);
             self.history.past.push(before);
         }
@@ -188,4 +190,8 @@ impl Model {
             }
         }
     }
+}
+/// Returns whether a step may be taken back, or again.
+fn may_go(examined: bool, step: &Step) -> bool {
+    !(examined && matches!(step, Step::Pose(_)))
 }

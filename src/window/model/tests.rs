@@ -256,3 +256,29 @@ fn marks_leave_an_image_that_goes_live_and_named_ones_stay_for_the_worksheet() {
     model.freeze(false, now);
     assert_eq!(counts(&model), [1, 1]);
 }
+
+#[test]
+fn in_an_examination_neither_home_nor_undo_leads_the_probe() {
+    let now = Instant::now();
+    let mut model = model(now);
+    let home = model.pose;
+    model.move_by(Source::Keyboard, Axis::Lateral, 5.0, now);
+    let there = model.pose;
+    assert_ne!(there, home);
+    model.examined = true;
+    model.undo(now);
+    model.go_home(Source::Keyboard, now);
+    assert_eq!(model.pose, there);
+    model.examined = false;
+    model.undo(now);
+    assert_eq!(model.pose, home);
+    model.examined = true;
+    model.redo(now);
+    assert_eq!(model.pose, home);
+    // Where an attempt is under way that is none, the way home counts as help.
+    model.examined = false;
+    model.redo(now);
+    model.looked_up = false;
+    model.go_home(Source::Keyboard, now);
+    assert!(model.pose == home && model.looked_up);
+}
