@@ -195,6 +195,16 @@ impl<'t> Columns<'t> {
         }
     }
 
+    /// The error of a row whose time is not later than that of the row before it.
+    pub fn out_of_order(&self, time: &Column, row: usize) -> SceneError {
+        let (now, before) = (time.values[row], time.values[row - 1]);
+        let message = match now == before {
+            true => format!("time {now} s occurs twice"),
+            false => format!("time {now} s follows {before} s"),
+        };
+        self.fail(time.places[row].clone(), message, "times must increase from row to row")
+    }
+
     /// Fails where the column `first` has no rows, where another one has not as many, and at numbers that are not finite or
     /// too large.
     pub fn check(&self, first: &str) -> Result<(), SceneError> {

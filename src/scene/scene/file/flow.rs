@@ -7,6 +7,7 @@ use glam::DVec3;
 use super::columns::{ColumnFile, Columns, text};
 use super::document::Document;
 use super::error::SceneError;
+use super::fusion;
 use super::motion::PERIOD;
 use super::placing::PLACE;
 use super::table::{Stated, Table};
@@ -14,7 +15,7 @@ use crate::scene::animation::Clock;
 use crate::scene::flow::{CentreLine, Course, Flow, FlowShape};
 use crate::scene::{Instance, Mesh, Scene, Warning};
 use crate::settings::units::{LENGTH, VELOCITY};
-use crate::settings::{Form, ScatterMode, TextureSpace, group, suggest, words};
+use crate::settings::{Form, ScatterMode, TextureSpace, group, words};
 
 /// Fastest flow, mm/s: jets of the tightest valves have 6 to 7 m/s.
 const FASTEST: f64 = 20_000.0;
@@ -144,11 +145,8 @@ impl OneFlow<'_> {
         if name.trim().is_empty() {
             return Err(self.fail("name", "a flow needs a name", "name the vessel"));
         }
-        let Some(instance) = scene.instances.iter().position(|i| i.name == *mesh) else {
-            let names = scene.instances.iter().map(|i| i.name.as_str());
-            let remedy = suggest::among(mesh, names);
-            return Err(self.fail("mesh", format!("there is no mesh `{mesh}`"), remedy));
-        };
+        let at = format!("{}.mesh", self.path);
+        let instance = fusion::named(self.document, &at, mesh, &scene.instances)?;
         if let Some((key, of)) = OWN.iter().find(|(key, of)| self.stated.has(key) && of != kind) {
             let message = format!("`{key}` belongs to flows of the kind `{of}`");
             let remedy = format!("remove it, or write kind = \"{of}\"");
@@ -308,9 +306,7 @@ impl OneFlow<'_> {
         table.check("time_s")?;
         let rows = time.values.len();
         if let Some(row) = (1..rows).find(|&i| time.values[i] <= time.values[i - 1]) {
-            let message = format!("time {} s follows {} s", time.values[row], time.values[row - 1]);
-            let remedy = "times must increase from row to row";
-            return Err(table.fail(time.places[row].clone(), message, remedy));
+            return Err(table.out_of_order(time, row));
         }
         let largest = speed.values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
         if rows < 2 || largest == 0.0 {

@@ -221,6 +221,19 @@ pub(super) fn fusion(
     Ok(Some(out))
 }
 
+/// The instance of this name, which stands at `path`.
+pub(super) fn named(
+    document: &Document<'_>,
+    path: &str,
+    name: &str,
+    instances: &[Instance],
+) -> Result<usize, SceneError> {
+    instances.iter().position(|i| i.name == name).ok_or_else(|| {
+        let names = instances.iter().map(|i| i.name.as_str());
+        document.fail(path, format!("there is no mesh `{name}`"), suggest::among(name, names))
+    })
+}
+
 /// The instance of this name, which is to be `what`: it must have an inside, in every shape that it
 /// takes.
 pub(super) fn closed_mesh(
@@ -231,14 +244,7 @@ pub(super) fn closed_mesh(
     meshes: &[Arc<Mesh>],
     instances: &[Instance],
 ) -> Result<usize, SceneError> {
-    let Some(index) = instances.iter().position(|i| i.name == name) else {
-        let names = instances.iter().map(|i| i.name.as_str());
-        return Err(document.fail(
-            path,
-            format!("there is no mesh `{name}`"),
-            suggest::among(name, names),
-        ));
-    };
+    let index = named(document, path, name, instances)?;
     let instance = &instances[index];
     let shapes = instance.keyframes.meshes.iter().chain([&instance.mesh]);
     let open = shapes.map(|&m| open_edges(&meshes[m])).max().unwrap_or(0);

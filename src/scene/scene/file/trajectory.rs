@@ -96,15 +96,7 @@ fn refused(
     q: Option<[&Column; 4]>,
 ) -> SceneError {
     match (error, q) {
-        (TrackError::Order(row), _) => {
-            let (now, before) = (time.values[*row], time.values[row - 1]);
-            let message = match now == before {
-                true => format!("time {now} s occurs twice"),
-                false => format!("time {now} s follows {before} s"),
-            };
-            let at = time.places[*row].clone();
-            table.fail(at, message, "times must increase from row to row")
-        }
+        (TrackError::Order(row), _) => table.out_of_order(time, *row),
         (TrackError::ZeroQuaternion(row), Some(q)) => {
             let at = q[0].places[*row].clone();
             let message = "this quaternion is zero, which is no rotation".to_owned();

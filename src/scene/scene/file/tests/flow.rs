@@ -138,7 +138,7 @@ fn mistakes_in_files_of_flows_are_placed() {
             3,
             "the radius is 0 mm",
         ),
-        (&wave, "pulse.csv", "time_s,speed\n0,1\n0,2\n", 3, "time 0 s follows 0 s"),
+        (&wave, "pulse.csv", "time_s,speed\n0,1\n0,2\n", 3, "time 0 s occurs twice"),
         (&wave, "pulse.csv", "time_s,speed\n0,1\n1,NaN\n", 3, "speed is not finite"),
         (&wave, "pulse.csv", "time_s,speed\n0,0\n1,0\n", 1, "a speed that is not zero"),
         (&wave, "pulse.csv", "time,speed\n0,1\n", 1, "unknown column `time`"),
