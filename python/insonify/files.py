@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from os import PathLike
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from . import _insonify
 from .simulator import Frames
 
 
-def save(path: str | PathLike[str], frames: _insonify.Frame | Frames, *, times: Sequence[float] | None = None) -> None:
+def save(path: str | PathLike[str], frames: _insonify.Frame | Frames, *, times: ArrayLike | None = None) -> None:
     """Writes a frame, or the frames of a loop, as a file of USTB (.uff) or of zea (.hdf5); docs/datasets.md says what
     is in them.
 
@@ -34,8 +34,9 @@ def save(path: str | PathLike[str], frames: _insonify.Frame | Frames, *, times: 
             legend = frames.legend if name == "labels" else legend
         arrays = {name: array[None] for name, array in arrays.items()}
         poses = frames.pose[None]
-    if times is not None and len(times) != len(poses):
-        raise ValueError(f"{len(times)} times of {len(poses)} frames")
+    moments = np.arange(len(poses)) / 10 if times is None else np.asarray(times, dtype=float)
+    if moments.shape != (len(poses),):
+        raise ValueError(f"{moments.size} times of {len(poses)} frames")
     _insonify.save(
         path,
         "insonify, `" + legend["scene"] + "`" if legend else "insonify",
@@ -43,7 +44,7 @@ def save(path: str | PathLike[str], frames: _insonify.Frame | Frames, *, times: 
         frames.axes["x"],
         frames.axes["z"],
         poses,
-        [i / 10 for i in range(len(poses))] if times is None else [float(time) for time in times],
+        moments.tolist(),
         {name: np.ascontiguousarray(array) for name, array in arrays.items()},
         [tissue["name"] for tissue in legend.get("tissues", [])],
     )
