@@ -366,7 +366,9 @@ fn a_client_that_does_not_read_delays_nobody() {
 
 #[test]
 fn dropping_the_server_ends_everything() {
-    let server = serve(settings());
+    // Its own address: a test beside this one may be given a port that has become free.
+    let address = std::net::SocketAddr::from(([127, 0, 0, 77], 0));
+    let server = Server::bind(address, settings()).expect("a server");
     let address = server.address();
     let mut clients = [Client::connect(&server), Client::connect(&server)];
     until("both are in", || server.status().clients == 2);
