@@ -1,14 +1,10 @@
 //! Colours of what flows: correlations of the last packet's pulses, and the finished image with them.
 
-use std::f64::consts::PI;
-
-use bytemuck::{Pod, Zeroable};
-
 use super::calibration::Calibration;
 use super::layout::{COLOUR_COLUMNS, COLOUR_ROWS};
 use super::push;
 use super::stages::colour::{COLOURED, Work};
-use super::{Packet, SimError, Simulator};
+use super::{Correlation, Packet, SimError, Simulator};
 use crate::gpu::Image;
 use crate::scene::Scene;
 use crate::settings::{Doppler, VelocityMap};
@@ -20,36 +16,6 @@ pub enum ColourMode {
     Color,
     /// Power of what moves, from dark red to yellow.
     Power,
-}
-
-/// The correlations of the echoes of a packet at one sample, of which velocity, variance and power follow.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-pub struct Correlation {
-    /// Mean of each pulse's echo times the conjugate of the one before, over pairs: real and imaginary part. Of what moves
-    /// towards the probe its phase is above 0.
-    pub next: [f32; 2],
-    /// Power: mean of squares, over pulses.
-    pub power: f32,
-}
-
-impl Correlation {
-    /// Velocity towards the probe, in the unit of `nyquist`, the velocity that turns an echo by half a turn from pulse to
-    /// pulse; 0 where there is no echo. After Kasai et al. 1985, IEEE Trans. Sonics Ultrason. 32, 458-464.
-    pub fn velocity(&self, nyquist: f64) -> f64 {
-        let [re, im] = self.next.map(f64::from);
-        nyquist * im.atan2(re) / PI
-    }
-
-    /// Variance of the velocity, in the square of that unit (Kasai et al. 1985).
-    pub fn variance(&self, nyquist: f64) -> f64 {
-        if self.power <= 0.0 {
-            return 0.0;
-        }
-        let [re, im] = self.next.map(f64::from);
-        let alike = re.hypot(im) / f64::from(self.power);
-        2.0 * (nyquist / PI).powi(2) * (1.0 - alike).max(0.0)
-    }
 }
 
 /// Colours of a mode, RGB: [`COLOUR_ROWS`] rows of [`COLOUR_COLUMNS`]. Columns are velocities towards the probe, evenly from the
