@@ -140,7 +140,7 @@ fn shape() -> [Row<Probe>; 4] {
         .key("field_of_view")
         .label("Field of view")
         .usual(10.0 * DEGREE, 180.0 * DEGREE)
-        .limits("0.001 to 6.2832 rad (phased: to 3.1416 rad)");
+        .limits("0.001 rad to 360 deg (phased: to 180 deg)");
     const WIDTH: Facts =
         Facts::quantity(&LENGTH, LEAST, 1000.0).key("width").label("Width").usual(10.0, 80.0);
     [

@@ -11,7 +11,7 @@ group! {
     /// Keys of every node.
     pub struct NodeKeys in "group" {
         /// Name in messages, and for `--set`.
-        name: String = String::new(), Facts::of(Form::Text).required().limits("unique");
+        name: String = String::new(), Facts::of(Form::Text).required().limits("not empty, unique");
         /// Group, transform or selector that it belongs to.
         parent: Option<String> = None, Facts::of(Form::Text).by_default("the world");
     }
@@ -55,11 +55,16 @@ pub(super) fn in_order<'f>(
 ) -> Result<Vec<Entry<'f>>, SceneError> {
     let mut out: Vec<Entry<'f>> = nodes.collect();
     out.sort_by_key(|e| document.place(&e.path));
+    let kind = |e: &Entry| e.path.split('.').next().unwrap_or_default().to_owned();
     let mut names = HashMap::new();
     for (e, entry) in out.iter().enumerate() {
+        if entry.name.trim().is_empty() {
+            let remedy = "say what it is; messages and `--set` use the name";
+            let message = format!("a {} needs a name", kind(entry));
+            return Err(document.fail(&format!("{}.name", entry.path), message, remedy));
+        }
         if let Some(other) = names.insert(entry.name, e) {
             let other: &Entry = &out[other];
-            let kind = |e: &Entry| e.path.split('.').next().unwrap_or_default().to_owned();
             return Err(document.fail(
                 &format!("{}.name", entry.path),
                 format!("a {} is already named `{}`", kind(other), entry.name),

@@ -258,6 +258,8 @@ fn mistakes_are_placed_and_come_with_a_remedy() {
     f(&format!("{cube}node = \"x\"\n"), (5, 8), "no node or object `x`", "choose one of");
     f(&format!("{cube}units = \"um\"\n"), (3, 8), "is 0.0100 mm large", "units = ");
     f(&format!("{cube}{cube}"), (6, 8), "two meshes named `a`", "own name");
+    f(&cube.replace("name = \"a\"", "name = \"\""), (2, 8), "a mesh needs a name", "what it is");
+    f("[[group]]\nname = \" \"\n", (2, 8), "a group needs a name", "what it is");
     f("[[mesh]]\nname = \"a\"\ntissue = \"fat\"\n", (1, 1), "neither `file` nor", "give one");
     f("[tissues.x]\nspeed = 1.5\n", (1, 1), "has no density", "based_on");
     f(
