@@ -98,3 +98,11 @@ def test_another_figure_is_noticed(folder, tmp_path):
 
 def test_blocks_keep_their_lines():
     assert blocks("a\n```python\nx = 1\n```\n\n```sh\nls\n```\n```python\ny\n```\n") == "\n\nx = 1\n\n\n\n\n\n\ny\n"
+
+
+def test_the_examples_are_typed(folder):
+    """By mypy --strict, as a user's own code beside them may be."""
+    command = [sys.executable, "-m", "mypy", "--strict", "--no-error-summary", "--cache-dir", str(ROOT / "target/mypy"), "page.py"]
+    environment = {**os.environ, "MYPYPATH": str(ROOT / "python")}
+    run = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
+    assert run.returncode == 0, run.stdout + run.stderr
