@@ -111,6 +111,56 @@ fn what_flows_away_is_blue_what_comes_is_red_and_tissue_stays_grey() {
     assert_eq!(colours(&folder.join("b.png"))[..2], [0, 0]);
 }
 
+/// Down the vessel at 60 degrees: 30 cm/s in its middle, away from the probe.
+#[test]
+fn a_gate_is_seen_measured_and_heard() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let wav = folder.join("a.wav");
+    let sound = wav.to_str().expect("plain");
+    let gate = [
+        "spectral.depth=20 mm",
+        "spectral.gate=1 mm",
+        "spectral.angle=60 deg",
+        "spectral.prf=4 kHz",
+        "spectral.window=30 ms",
+        "spectral.duration=0.5 s",
+        "spectral.wall_filter=50 Hz",
+    ];
+    let set = gate.iter().flat_map(|set| ["--set", *set]);
+    let more: Vec<&str> = ["--mode", "pw", "--sound", sound].into_iter().chain(set).collect();
+    let out = render(folder, "a.png", &more);
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let text = std::fs::read_to_string(folder.join("a.json")).expect("a sidecar");
+    let facts: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    let maximum = facts["spectrum"]["maximum_mm_per_s"].as_f64().expect("a number");
+    // What transit time adds to it, docs/doppler.md.
+    assert!((-400.0..-285.0).contains(&maximum), "{maximum}");
+    let picture = image::open(folder.join("a.png")).expect("a picture").to_luma8();
+    let half = picture.height() / 2;
+    let sum = |rows: std::ops::Range<u32>| -> u64 {
+        rows.flat_map(|y| (0..picture.width()).map(move |x| (x, y)))
+            .map(|(x, y)| u64::from(picture.get_pixel(x, y).0[0]))
+            .sum()
+    };
+    let [above, below] = [sum(0..half - 4), sum(half + 4..2 * half)];
+    assert!(below > 4 * above, "{above} {below}");
+    // Stereo, 48000 a second, 16 bits: what goes away is on the right.
+    let bytes = std::fs::read(&wav).expect("written");
+    let samples: Vec<f64> = bytes[44..]
+        .chunks_exact(2)
+        .map(|pair| f64::from(i16::from_le_bytes([pair[0], pair[1]])))
+        .collect();
+    assert_eq!(samples.len(), 2 * 24_000);
+    let power = |side: usize| samples.iter().skip(side).step_by(2).map(|s| s * s).sum::<f64>();
+    assert!(power(1) > 10.0 * power(0), "{} {}", power(0), power(1));
+    let up = samples.chunks_exact(2).collect::<Vec<_>>();
+    let up = up.windows(2).filter(|two| two[0][1] < 0.0 && two[1][1] >= 0.0).count();
+    // 2 f v cos(60 deg) / c of the preset's 7.6 MHz.
+    let expected = 2.0 * 7.6e6 * 0.3 * 0.5 / 1540.0 * 0.5;
+    assert!((0.8..1.15).contains(&(up as f64 / expected)), "{up} of {expected}");
+}
+
 #[test]
 fn mistakes_in_doppler_have_a_remedy() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -142,5 +192,18 @@ fn mistakes_in_doppler_have_a_remedy() {
         assert!(!out.status.success(), "{more:?}");
         let flat = said.split_whitespace().filter(|w| *w != "│").collect::<Vec<_>>().join(" ");
         assert!(flat.contains(cause) && flat.contains(remedy), "{more:?}: {said}");
+    }
+    for (mode, sound, cause, remedy) in [
+        ("color", "a.wav", "colours have none", "--mode pw"),
+        ("pw", "a.mp3", "a sound is a WAV file", ".wav"),
+        ("pw", "a.png", "both", "-o"),
+    ] {
+        let sound = folder.path().join(sound);
+        let sound = sound.to_str().expect("plain");
+        let out = render(folder.path(), "a.png", &["--mode", mode, "--sound", sound]);
+        let said = String::from_utf8_lossy(&out.stderr);
+        assert!(!out.status.success(), "{mode} {sound}");
+        let flat = said.split_whitespace().filter(|w| *w != "│").collect::<Vec<_>>().join(" ");
+        assert!(flat.contains(cause) && flat.contains(remedy), "{mode} {sound}: {said}");
     }
 }

@@ -8,7 +8,7 @@ use insonify::doppler::spectrum::{Analyser, Spectrogram};
 use insonify::gpu::test_device;
 use insonify::scene::flow::{CentreLine, Course, Flow, FlowShape};
 use insonify::scene::{Scene, shapes};
-use insonify::settings::Spectral;
+use insonify::settings::{Spectral, Wave};
 use insonify::sim::shaders::Library;
 use insonify::sim::{Packet, Simulator, Tracer};
 
@@ -106,6 +106,52 @@ fn spectra_have_the_mean_and_the_width_of_what_crosses_the_beam() {
     }
 }
 
+/// A continuous wave hears all of its line, wherever the gate would be, and velocities for which pulses to that depth come too
+/// seldom: 3 m/s along the line, 40 mm deep, where pulses tell apart 1. By the cosine law within 3 %.
+#[test]
+fn a_continuous_wave_has_no_depth_and_no_fastest_velocity() {
+    let (angle, speed) = (60.0_f64.to_radians(), 6000.0);
+    let mut scene = block(angle, -speed);
+    let spectral = Spectral {
+        wave: Wave::Continuous,
+        prf: 100_000.0,
+        depth: 40.0,
+        wall_filter: 0.0,
+        window: 0.005,
+        columns: 1000.0,
+        ..Spectral::default()
+    };
+    let probe = scene.probe.clone();
+    let mut simulator = simulator(&scene);
+    let mut heard = |spectral: &Spectral| {
+        scene.spectral.clone_from(spectral);
+        record(&mut simulator, &mut scene, 0.0, 900, 0).expect("echoes").0
+    };
+    let echoes = heard(&spectral);
+    let mean = |spectral: &Spectral, echoes: &Vec<_>| {
+        let mut analyser = Analyser::new(spectral);
+        analyser.add(echoes);
+        let made = analyser.take().shown(&probe, spectral);
+        let columns = made.columns().flat_map(|column| column.iter().zip(&made.velocities));
+        let [all, weighted] = columns.fold([0.0; 2], |[all, weighted], (&power, v)| {
+            [all + f64::from(power), weighted + f64::from(power) * v]
+        });
+        weighted / all
+    };
+    let (found, expected) = (mean(&spectral, &echoes), speed * angle.cos());
+    assert!((found / expected - 1.0).abs() < 0.03, "{found} {expected}");
+    let elsewhere = Spectral { depth: 5.0, ..spectral.clone() };
+    assert!(heard(&elsewhere) == echoes, "the gate's depth counts");
+    // The planted error: pulses as close as that depth allows fold over.
+    let most = probe.speed * 1e6 / (2.0 * 41.0);
+    let pulsed = Spectral { wave: Wave::Pulsed, prf: most, ..spectral.clone() };
+    assert!(pulsed.fault(&probe).is_none() && spectral.fault(&probe).is_none());
+    let too_many = Spectral { wave: Wave::Pulsed, ..spectral };
+    assert_eq!(too_many.fault(&probe).map(|fault| fault.0), Some("prf"));
+    let folded = mean(&pulsed, &heard(&pulsed));
+    assert!((folded / expected - 1.0).abs() > 0.5, "{folded}");
+}
+
 /// The mean spectrum of the gate over a whole vessel: a parabola has every velocity as often as every other, up to that of its
 /// axis; an exponent K has (1 - f / f_max)^(2 / K - 1). Means over fifths of the range within a fifth, beyond the end nothing.
 #[test]
@@ -138,10 +184,10 @@ fn the_spectrum_of_a_whole_lumen_is_flat_for_a_parabola() {
         let mut analysers = Vec::new();
         for seed in 0..3 {
             scene.simulation.seed = seed;
-            let mut analyser = Analyser::new(&scene.probe, &scene.spectral);
+            let mut analyser = Analyser::new(&scene.spectral);
             let (echoes, _) = record(&mut simulator, &mut scene, 0.0, 2400, 0).expect("echoes");
             analyser.add(&echoes);
-            analysers.push(analyser.finish());
+            analysers.push(analyser.take().shown(&scene.probe, &scene.spectral));
         }
         let mut all = analysers.remove(0);
         analysers.iter().for_each(|more| all.power.extend(&more.power));

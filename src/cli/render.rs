@@ -9,7 +9,7 @@ use super::common::{self, Common, Progress, Stage};
 use insonify::gpu::{Device, FrameTimings, peak_bytes};
 use insonify::output;
 use insonify::scene::{Scene, file, shipped};
-use insonify::settings::{Group as _, ScatterMode, Simulation};
+use insonify::settings::{Group as _, ScatterMode, Simulation, Wave};
 use insonify::sim::calibration::Calibration;
 use insonify::sim::contact::{REACH_SKIN, UNTOUCHED};
 use insonify::sim::dump;
@@ -40,6 +40,8 @@ enum Mode {
     Power,
     /// Pulsed wave: spectra of a gate against time.
     Pw,
+    /// Continuous wave: spectra of a whole line against time.
+    Cw,
 }
 
 impl Mode {
@@ -48,7 +50,16 @@ impl Mode {
         match self {
             Self::Color => Some(ColourMode::Color),
             Self::Power => Some(ColourMode::Power),
-            Self::Pw => None,
+            Self::Pw | Self::Cw => None,
+        }
+    }
+
+    /// How a spectral mode listens; none of one with an image.
+    fn wave(self) -> Option<Wave> {
+        match self {
+            Self::Color | Self::Power => None,
+            Self::Pw => Some(Wave::Pulsed),
+            Self::Cw => Some(Wave::Continuous),
         }
     }
 }
@@ -92,15 +103,18 @@ pub struct Render {
     labels: Option<PathBuf>,
     /// Doppler. Colours the image by a packet of pulses in the colour box of the scene's [doppler]: `color` shows velocities, red
     /// towards the probe and blue away from it, `power` how much moves. `pw` records the gate of [spectral] instead of an
-    /// image, and shows its spectra against time; NAME.json says what is measured on them. PNG only.
+    /// image, and shows its spectra against time, `cw` all of the gate's line by a continuous wave; NAME.json says what is measured on them. PNG only.
     #[arg(long, value_enum, conflicts_with = "dump")]
     mode: Option<Mode>,
     /// Writes the packet of the last frame of --mode: `iq` (pulse, scanline, sample; real and imaginary), `times` (s), `depth`
     /// (mm), and what was found, `velocity` (mm/s, towards the probe), `variance`, `power` (scanline, sample); packet.json says
-    /// frequency, speed of sound and PRF. Of `pw`: `iq` (pulse; real and imaginary), `spectrum` (time, velocity), `velocity`,
+    /// frequency, speed of sound and PRF. Of `pw` and `cw`: `iq` (pulse; real and imaginary), `spectrum` (time, velocity), `velocity`,
     /// `times`, and the traces `maximum` and `mean`. NAME.npz
     #[arg(long, value_name = "FILE", requires = "mode")]
     packet: Option<PathBuf>,
+    /// Writes what `--mode pw` or `cw` hears as sound, stereo: towards the probe left, away from it right. NAME.wav
+    #[arg(long, value_name = "FILE", requires = "mode")]
+    sound: Option<PathBuf>,
     /// Writes every stage as a numbered array with its axes into this folder.
     #[arg(long, value_name = "DIR")]
     dump: Option<PathBuf>,
@@ -134,9 +148,14 @@ pub fn run(args: &Render) -> Result<()> {
     let moments = moments(args, &scene)?;
     let frames = u32::try_from(moments.len()).expect("no more than can be asked for");
     film::check(&output, frames)?;
+    let wave = args.mode.and_then(Mode::wave);
+    if let Some(wave) = wave {
+        scene.spectral.wave = wave;
+    }
     match args.mode {
-        Some(Mode::Pw) => spectrum::check(args, &output, &scene)?,
+        Some(mode) if mode.wave().is_some() => spectrum::check(args, &output, &scene)?,
         Some(_) => {
+            spectrum::check_silent(args)?;
             film::check_colour(&output)?;
             coloured::check(&scene)?;
         }
@@ -155,7 +174,7 @@ pub fn run(args: &Render) -> Result<()> {
         args.common.stage(&mut scene, &library)?;
 
     let sidecar = sidecar(args, &output, &scene, &of_file, &device, tracer)?;
-    if args.mode == Some(Mode::Pw) {
+    if wave.is_some() {
         let (timings, mut said) =
             spectrum::write(args, &output, &mut simulator, &mut scene, sidecar)?;
         if let Some(file) = &args.json {
@@ -234,6 +253,7 @@ fn distinct(args: &Render, output: &Path) -> Result<()> {
             ("--json", args.json.as_deref()),
             ("--labels", args.labels.as_deref()),
             ("--packet", args.packet.as_deref()),
+            ("--sound", args.sound.as_deref()),
         ],
     )
 }

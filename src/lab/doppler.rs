@@ -1,6 +1,7 @@
 //! Packets of pulses for Doppler modes: the colour box, and the velocity at which its colours fold over.
 
 pub mod gate;
+pub mod sound;
 pub mod spectrum;
 pub mod trace;
 

@@ -35,7 +35,7 @@ pub use processing::Processing;
 pub use simulation::{
     Coherence, Loss, Quality, Refraction, Sampling, ScatterMode, Sequence, Simulation, TextureSpace,
 };
-pub use spectral::Spectral;
+pub use spectral::{Spectral, Wave};
 pub use surface::Surface;
 pub use tissue::Tissue;
 pub use value::{Value, plain};

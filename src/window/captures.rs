@@ -86,8 +86,10 @@ impl From<FilmError> for CaptureError {
     }
 }
 
-/// The M-mode strip as it is saved beside an image or a clip.
+/// A strip as it is saved beside an image or a clip.
 pub(super) struct SavedStrip {
+    /// Its name in the sidecar, and in the file's name.
+    pub(super) name: &'static str,
     /// Width and height.
     pub(super) size: [u32; 2],
     /// Grey levels, row by row.
@@ -99,12 +101,12 @@ pub(super) struct SavedStrip {
 impl SavedStrip {
     /// Writes it under the number of a capture, and into its sidecar.
     fn write(self, claim: &mut Claim, sidecar: &mut Sidecar) -> Result<(), CaptureError> {
-        let file = claim.add("-mmode.png");
+        let file = claim.add(&format!("-{}.png", self.name));
         let rgba: Vec<u8> = self.levels.iter().flat_map(|&l| [l, l, l, 255]).collect();
         files::write_new(&file, &files::colour_png(self.size, &rgba))?;
         let mut facts = self.facts;
         facts["file"] = files::name(&file);
-        sidecar.insert("mmode".into(), facts);
+        sidecar.insert(self.name.into(), facts);
         Ok(())
     }
 }
@@ -117,8 +119,8 @@ pub(super) struct Still {
     pub(super) sidecar: Sidecar,
     /// The image with its marks, as in the window.
     pub(super) marked: Option<Screenshot>,
-    /// The M-mode strip, while it is drawn.
-    pub(super) strip: Option<SavedStrip>,
+    /// The strips that are drawn.
+    pub(super) strips: Vec<SavedStrip>,
     /// Head of its DICOM file; none where none is wanted.
     pub(super) dicom: Option<About>,
 }
@@ -209,7 +211,7 @@ impl Captures {
                 sidecar.insert("dicom_file".into(), files::name(&file));
                 dicom::still(&file, about, [width, height], &rgba)?;
             }
-            if let Some(strip) = still.strip {
+            for strip in still.strips {
                 strip.write(&mut claim, &mut sidecar)?;
             }
             claim.keep(&sidecar)?;

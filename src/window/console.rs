@@ -3,7 +3,7 @@
 
 mod anatomy;
 mod animation;
-mod controls;
+pub(super) mod controls;
 mod fusion;
 mod image;
 mod input;

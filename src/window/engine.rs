@@ -13,6 +13,7 @@ use super::deaths::SIMULATION;
 use super::link::Link;
 use super::look::{Look, Pictured};
 use super::model::mmode::{Aim, Column};
+use super::model::spectrum::Heard;
 use super::model::{Order, Settings};
 use super::picture::{Film, Frame};
 use super::wake::Wake;
@@ -29,8 +30,8 @@ mod worker;
 /// the next one: it gets a seventh of the time.
 const VIEW3D_PUT_OFF: u32 = 6;
 
-/// While the M-mode strip of a moving scene is drawn, the next image waits this many times the duration of the last one:
-/// the strip gets seven eighths of the time, as on scanners, whose image then stands for a second at a time.
+/// While a strip of a moving scene is drawn, M-mode or spectra, the next image waits this many times the duration of the last
+/// one: the strip gets seven eighths of the time, as on scanners, whose image then stands for a second at a time.
 const STRIP_PUT_OFF: u32 = 7;
 
 /// Longest time for which the image stands beside the strip.
@@ -47,6 +48,8 @@ pub enum News {
     Frame(Box<Frame>, Film),
     /// Columns along a line for the M-mode strip, between two pictures, and the probe that they were made with.
     Columns(Box<Probe>, Aim, Vec<Column>),
+    /// Spectra of pulsed-wave Doppler, before a picture or between two.
+    Spectra(Box<Heard>),
     /// A picture of a past moment at the scene's own quality, in place of that of the loop.
     Anew(Box<Frame>),
     /// A picture of the anatomy.
@@ -102,8 +105,8 @@ struct State {
 enum Job {
     /// An image.
     Image(Order),
-    /// Columns of the M-mode strip.
-    Columns(Order),
+    /// Columns of the M-mode strip, and spectra.
+    Strips(Order),
     Open(Box<Scene>, Order),
     /// The last image once more, at a finer level.
     Refined(usize),

@@ -15,7 +15,7 @@ use super::place::Place;
 use super::state::State;
 use super::{
     beside, body, calipers, cine, colour, deaths, dual, ecg, files, leaving, mmode, naming, notice,
-    offer, saved, strip, style, view3d,
+    offer, saved, spectrum, strip, style, view3d,
 };
 use crate::settings::Exam;
 
@@ -304,9 +304,13 @@ fn images(
     }
     if let (Some(place), Some(frame)) = (&place, frame) {
         colour::the_box(ui, place, &frame.probe, model, now);
+        spectrum::gate(ui, place, &frame.probe, model, now);
     }
     if let Some(fault) = colour::fault(model) {
         notice::badge(ui, "no colours", "What flows cannot be coloured:", &fault);
+    }
+    if let Some(fault) = spectrum::fault(model) {
+        notice::badge(ui, "no spectra", "Spectra cannot be made:", &fault);
     }
     if state.prepares && frame.is_some() {
         notice::preparing(ui, state.preparing);

@@ -10,7 +10,7 @@ use super::model::sheet::{Sheet, What};
 use super::picture::Frame;
 use super::place::{self, Place};
 use super::state::State;
-use super::{bmode, body, calipers, ecg, mmode, real, style};
+use super::{bmode, body, calipers, ecg, mmode, real, spectrum, style};
 use crate::gpu::{Device, GpuError, InterfaceFrame, PlacedImage, Screenshot, picture};
 use crate::settings::Exam;
 
@@ -121,6 +121,9 @@ fn draw(
         }
         if let Some(strip) = &mut model.mmode {
             mmode::aim(ui, place, frame, strip, true);
+        }
+        if model.spectrum.is_some() {
+            spectrum::mark(ui, place, &frame.probe, &model.settings.spectral);
         }
     }
     let below = Rect::from_min_max(parts.images.min, pos2(parts.images.right(), parts.whole.y));

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use egui::{
-    Align2, Color32, ColorImage, Context, DragValue, FontId, Key, PointerButton, Rect, Sense,
+    Align2, Color32, ColorImage, Context, DragValue, FontId, Key, PointerButton, Pos2, Rect, Sense,
     Stroke, TextureHandle, TextureOptions, Ui, pos2, vec2,
 };
 use glam::DVec2;
@@ -87,7 +87,7 @@ pub(super) fn saved(model: &Model, panel: &MmodePanel) -> Option<SavedStrip> {
         "measurements": measurements.collect::<Vec<_>>(),
     });
     let levels = strip.raster(end, panel.window, WIDEST);
-    Some(SavedStrip { size: [WIDEST as u32, ROWS as u32], levels, facts })
+    Some(SavedStrip { name: "mmode", size: [WIDEST as u32, ROWS as u32], levels, facts })
 }
 
 impl Panel for MmodePanel {
@@ -148,7 +148,8 @@ impl Panel for MmodePanel {
             let end = strip.newest().unwrap_or(panel.window).max(panel.window);
             draw(ui, strip, panel, inner, end);
             let Some(depth) = strip.length() else { return };
-            rulers(ui, inner, depth, panel.window, end);
+            depths(ui, inner, depth);
+            seconds(ui, inner, panel.window, end);
             let at = |[seconds, mm]: [f64; 2]| {
                 let x = 1.0 - ((end - seconds) / panel.window) as f32;
                 inner.min + inner.size() * vec2(x, (mm / depth) as f32)
@@ -173,15 +174,7 @@ impl Panel for MmodePanel {
             panel.drawing &= !response.drag_stopped();
             response.on_hover_text("Drag from one point to another to measure time and depth");
             for (letter, span) in ('A'..='Z').zip(&panel.spans) {
-                let line = Stroke::new(1.5, style::ACCENT);
-                let painter = ui.painter_at(inner);
-                painter.line_segment([at(span.from), at(span.to)], line);
-                for end in [span.from, span.to] {
-                    painter.circle_stroke(at(end), 4.0, line);
-                }
-                let place = at(span.to) + vec2(6.0, -6.0);
-                let font = FontId::proportional(12.0);
-                painter.text(place, Align2::LEFT_BOTTOM, letter, font, style::ACCENT);
+                marked(ui, inner, [at(span.from), at(span.to)], letter);
             }
         });
     }
@@ -282,8 +275,20 @@ fn draw(ui: &Ui, strip: &Strip, panel: &mut MmodePanel, inner: Rect, end: f64) {
     ui.painter().image(texture.id(), inner, all, Color32::WHITE);
 }
 
-/// Draws the rulers: depth at the right, seconds below.
-fn rulers(ui: &Ui, inner: Rect, depth: f64, window: f64, end: f64) {
+/// Draws a measurement of a strip with its letter.
+pub(super) fn marked(ui: &Ui, inner: Rect, ends: [Pos2; 2], letter: char) {
+    let line = Stroke::new(1.5, style::ACCENT);
+    let painter = ui.painter_at(inner);
+    painter.line_segment(ends, line);
+    for end in ends {
+        painter.circle_stroke(end, 4.0, line);
+    }
+    let place = ends[1] + vec2(6.0, -6.0);
+    painter.text(place, Align2::LEFT_BOTTOM, letter, FontId::proportional(12.0), style::ACCENT);
+}
+
+/// Draws the ruler of depths at the right.
+fn depths(ui: &Ui, inner: Rect, depth: f64) {
     let font = FontId::proportional(10.0);
     for share in [0.0, 0.5, 1.0] {
         let y = inner.top() + inner.height() * share as f32;
@@ -293,6 +298,11 @@ fn rulers(ui: &Ui, inner: Rect, depth: f64, window: f64, end: f64) {
         let align = align[(2.0 * share) as usize];
         (ui.painter()).text(at, align, text, font.clone(), style::FAINT);
     }
+}
+
+/// Draws the ruler of seconds below a strip.
+pub(super) fn seconds(ui: &Ui, inner: Rect, window: f64, end: f64) {
+    let font = FontId::proportional(10.0);
     let step = window / 8.0;
     let first = ((end - window) / step).ceil() as i64;
     for tick in first..=(end / step).floor() as i64 {

@@ -22,6 +22,7 @@ mod saving;
 mod settings;
 pub mod sheet;
 pub mod sidecar;
+pub mod spectrum;
 pub mod trajectory;
 mod trajectory_state;
 mod view3d;
@@ -50,6 +51,7 @@ pub use saving::File;
 pub(crate) use settings::ELABORATE;
 pub use settings::Settings;
 use sheet::{Marks, Sheet};
+use spectrum::{Heard, SpectrumStrip};
 use trajectory::Replay;
 pub use trajectory_state::{StoredTrajectory, TrajectoryState};
 pub use view3d::{Shown, View3d};
@@ -82,6 +84,8 @@ pub struct Model {
     pub beat: Option<crate::scene::animation::Clock>,
     /// The M-mode strip of one scanline, while it is drawn.
     pub mmode: Option<Strip>,
+    /// The spectra of pulsed-wave Doppler, while they are drawn.
+    pub spectrum: Option<SpectrumStrip>,
     /// The placed meshes, as [`Settings::surfaces`].
     pub meshes: Vec<Placed>,
     /// The tissue around them: index into [`Settings::tissues`].
@@ -163,6 +167,8 @@ pub struct Order {
     pub clock: Clock,
     /// The line of the M-mode strip, while it is drawn.
     pub mmode: Option<Aim>,
+    /// True while spectra are drawn.
+    pub spectrum: bool,
     /// Number that grows with every change.
     pub revision: u64,
     /// Time of the change: the arrival of the input event.
@@ -178,9 +184,9 @@ impl Order {
         }
     }
 
-    /// The same order for an image with other settings, none of whose lines the M-mode strip takes.
+    /// The same order for an image with other settings, of which no strip takes anything.
     pub fn with(&self, settings: Settings) -> Self {
-        Self { settings, mmode: None, ..self.clone() }
+        Self { settings, mmode: None, spectrum: false, ..self.clone() }
     }
 
     /// The same order, decided at `at`.
@@ -212,6 +218,7 @@ impl Model {
             animated,
             beat: scene.beat(),
             mmode: None,
+            spectrum: None,
             meshes: (scene.instances.iter().enumerate())
                 .map(|(index, i)| Placed {
                     name: i.name.clone(),
@@ -358,6 +365,13 @@ impl Model {
         }
     }
 
+    /// Adds spectra to their strip, if it is drawn.
+    pub fn hear(&mut self, heard: &Heard) {
+        if let Some(strip) = &mut self.spectrum {
+            strip.add(heard);
+        }
+    }
+
     /// The strip's time at a moment.
     fn strip_time(&self, seconds: f64, at: Instant) -> f64 {
         match self.animated {
@@ -377,6 +391,7 @@ impl Model {
             clock: self.clock,
             replay: self.trajectory.replay.clone(),
             mmode: self.mmode.as_ref().map(Strip::line),
+            spectrum: self.spectrum.is_some(),
             revision: self.revision,
             at: self.changed,
         }

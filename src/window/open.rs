@@ -132,6 +132,7 @@ impl Open {
                 News::Columns(probe, aim, columns) => {
                     self.model.film_columns(&probe, aim, columns);
                 }
+                News::Spectra(heard) => self.model.hear(&heard),
                 News::Anew(frame) => {
                     self.state.prepares = false;
                     self.state.common.tools.put_back(&frame);

@@ -9,6 +9,7 @@ use super::lesson::{self, Lesson};
 use super::mmode::{self, MmodePanel};
 use super::panel::{Panel, Row};
 use super::planes::{self, Planes};
+use super::spectrum::{self, SpectrumPanel};
 use super::timing::{self, Timing};
 use super::view3d::{self, View3dPanel};
 
@@ -51,6 +52,8 @@ panels! {
     planes: Planes = planes::ROW;
     /// A line against time.
     mmode: MmodePanel = mmode::ROW;
+    /// Velocities in the gate against time.
+    spectrum: SpectrumPanel = spectrum::ROW;
     /// Measurements of the examination.
     exam: Examination = exam::ROW;
 }

@@ -182,13 +182,13 @@ impl Tools {
         self.due.is_some() || self.captures.running().next().is_some()
     }
 
-    /// Saves the wanted content. `marked` is the picture of the image with its marks, `strip` that of M-mode,
+    /// Saves the wanted content. `marked` is the picture of the image with its marks, `strips` those below it,
     /// `study` what DICOM files belong to.
     pub(super) fn save(
         &mut self,
         model: &Model,
         marked: Option<Screenshot>,
-        strip: impl FnOnce() -> Option<SavedStrip>,
+        strips: impl FnOnce() -> Vec<SavedStrip>,
         study: impl FnOnce() -> Study,
     ) {
         let Some(wanted) = self.due.take() else {
@@ -210,11 +210,11 @@ impl Tools {
                 }
                 let dicom = (self.format == Format::Dicom)
                     .then(|| captures::about(&frame, &model.title, study()));
-                let still = Still { frame, sidecar, marked, strip: strip(), dicom };
+                let still = Still { frame, sidecar, marked, strips: strips(), dicom };
                 self.captures.still(folder, stem, still);
             }
             Wanted::Clip => {
-                let clip = Clip { strip: strip(), ..self.marked_loop(model, &frame, study()) };
+                let clip = Clip { strips: strips(), ..self.marked_loop(model, &frame, study()) };
                 self.captures.clip(folder, stem, clip);
             }
         }
@@ -259,7 +259,7 @@ impl Tools {
         let moments: Vec<Moment> = frames.iter().map(|(frame, _)| frame.moment()).collect();
         sidecar.extend(sidecar::marks(model.sheet.all(), &moments));
         let about = captures::about(largest, &model.title, study);
-        Clip { frames, sidecar, format: self.format, about, strip: None }
+        Clip { frames, sidecar, format: self.format, about, strips: Vec::new() }
     }
 
     /// The text common to pictures and clips.

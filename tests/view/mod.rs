@@ -18,6 +18,7 @@ mod panels;
 mod planes;
 mod robust;
 mod soak;
+mod spectrum;
 mod tools;
 mod tracker;
 mod trajectory;

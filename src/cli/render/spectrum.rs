@@ -1,5 +1,6 @@
-//! Pulsed-wave Doppler: the spectra of a gate against time as a picture, with what is measured on them.
+//! Spectral Doppler: the spectra of a gate, or of a whole line, against time as a picture, with what is measured on them.
 
+use std::io::Cursor;
 use std::path::Path;
 
 use miette::{IntoDiagnostic, Result, miette};
@@ -9,13 +10,14 @@ use super::Render;
 use crate::cli::common::{self, Progress};
 use insonify::doppler::spectrum::{Analyser, Spectrogram, greys};
 use insonify::doppler::trace::{Measured, Trace, measure, trace};
-use insonify::doppler::{gate, nyquist};
+use insonify::doppler::{gate, nyquist, sound};
 use insonify::gpu::FrameTimings;
 use insonify::output;
 use insonify::output::files;
 use insonify::output::npy::Element;
 use insonify::output::npz::{self, Entry};
 use insonify::scene::Scene;
+use insonify::settings::Words;
 use insonify::sim::Simulator;
 use insonify::sim::calibration::Calibration;
 
@@ -39,7 +41,7 @@ pub fn check(args: &Render, output: &Path, scene: &Scene) -> Result<()> {
     if let Some((name, _)) = others.iter().find(|(_, given)| *given) {
         return Err(miette!(
             help = "leave it out; --set spectral.duration=\"5 s\" records for longer",
-            "{name} is for images, and --mode pw is one recording of a gate"
+            "{name} is for images, and a spectral mode is one recording of a gate"
         ));
     }
     if output.extension().is_some_and(|e| !e.eq_ignore_ascii_case("png")) {
@@ -49,9 +51,33 @@ pub fn check(args: &Render, output: &Path, scene: &Scene) -> Result<()> {
             output.display()
         ));
     }
+    if let Some(sound) = &args.sound {
+        if sound.extension().is_none_or(|e| !e.eq_ignore_ascii_case("wav")) {
+            return Err(miette!(
+                help = "end the name in .wav",
+                "{} is not written: a sound is a WAV file",
+                sound.display()
+            ));
+        }
+        common::writable(sound)?;
+    }
     match scene.spectral.fault(&scene.probe) {
         None => common::writable(output),
         Some((key, message, remedy)) => Err(miette!(help = remedy, "spectral.{key}: {message}")),
+    }
+}
+
+/// Refuses a sound of a mode that has none.
+///
+/// # Errors
+/// The fault with its remedy.
+pub fn check_silent(args: &Render) -> Result<()> {
+    match &args.sound {
+        None => Ok(()),
+        Some(_) => Err(miette!(
+            help = "--mode pw and --mode cw record a gate, which is heard",
+            "--sound is what a gate hears, and colours have none"
+        )),
     }
 }
 
@@ -70,7 +96,7 @@ pub fn write(
     let spectral = scene.spectral.clone();
     let pulses = (spectral.duration * spectral.prf).round() as usize;
     let start = args.common.time;
-    let mut analyser = Analyser::new(&scene.probe, &spectral);
+    let mut analyser = Analyser::new(&spectral);
     let mut progress = Progress::new(pulses as u32, "pulses");
     let (mut echoes, mut index, mut timings) = (Vec::with_capacity(pulses), 0, Vec::new());
     while echoes.len() < pulses {
@@ -84,7 +110,7 @@ pub fn write(
         progress.done(echoes.len() as u32);
     }
     progress.finish();
-    let made = analyser.finish();
+    let made = analyser.take().shown(&scene.probe, &spectral);
     let traces = trace(&made);
     let measured = measure(&made.times, &traces);
     sidecar.insert("spectrum".into(), facts(scene, &made, &traces, measured));
@@ -95,6 +121,15 @@ pub fn write(
         let echoes: Vec<[f32; 2]> = echoes.iter().map(|e| [e.re as f32, e.im as f32]).collect();
         let said = sidecar["spectrum"].to_string();
         write_arrays(file, &echoes, &made, &traces, &said)
+            .map_err(|e| miette!("writing {}: {e}", file.display()))?;
+        output::line(file.display());
+    }
+    if let Some(file) = &args.sound {
+        let mut wav = Cursor::new(Vec::new());
+        let written = sound::write_wav(&mut wav, &sound::sound(&spectral, &echoes));
+        let written = written.map_err(std::io::Error::other);
+        written
+            .and_then(|()| files::replace(file, wav.get_ref()))
             .map_err(|e| miette!("writing {}: {e}", file.display()))?;
         output::line(file.display());
     }
@@ -111,6 +146,7 @@ fn facts(scene: &Scene, made: &Spectrogram, traces: &Trace, measured: Option<Mea
     let cosine = spectral.angle.cos();
     let farthest = |most: f64, v: &f64| if v.abs() > most.abs() { *v } else { most };
     json!({
+        "wave": spectral.wave.word(),
         "prf_hz": spectral.prf,
         "frequency_mhz": scene.probe.frequency,
         "speed_mm_per_us": scene.probe.speed,

@@ -1,10 +1,12 @@
-//! The gate of pulsed-wave Doppler: its echoes, pulse after pulse.
+//! The gate of spectral Doppler: its echoes, pulse after pulse; of a continuous wave those of all of its line.
+
+use std::ops::Range;
 
 use rustfft::num_complex::Complex;
 
 use crate::probe::Probe;
 use crate::scene::Scene;
-use crate::settings::Spectral;
+use crate::settings::{Spectral, Wave};
 use crate::sim::{Packet, SimError, Simulator};
 
 /// Time for which tissue is taken to stand still, s: its echoes are made anew as often.
@@ -12,19 +14,27 @@ const STILL: f64 = 0.01;
 /// Most pulses of a packet.
 const MOST: f64 = 64.0;
 
-/// The scanline and the samples of a gate, as a packet of `pulses` pulses of which the scene's time is the first.
-fn packet(probe: &Probe, spectral: &Spectral, pulses: usize) -> Packet {
-    let line = (spectral.line * f64::from(probe.scanlines)) as u32;
-    let line = line.min(probe.scanlines - 1);
+/// The samples of the gate on its scanline.
+fn samples(probe: &Probe, spectral: &Spectral) -> Range<u32> {
     let [start, end] = [-0.5, 0.5].map(|end| {
         let at = (spectral.depth + end * spectral.gate) / probe.sample_pitch();
         at.round().clamp(0.0, f64::from(probe.samples)) as u32
     });
     let start = start.min(probe.samples - 1);
+    start..end.max(start + 1)
+}
+
+/// The scanline and the samples that are heard, as a packet of `pulses` pulses of which the scene's time is the first.
+fn packet(probe: &Probe, spectral: &Spectral, pulses: usize) -> Packet {
+    let line = (spectral.line * f64::from(probe.scanlines)) as u32;
+    let line = line.min(probe.scanlines - 1);
     Packet {
         times: (0..pulses).map(|n| n as f64 / spectral.prf).collect(),
         lines: line..line + 1,
-        samples: start..end.max(start + 1),
+        samples: match spectral.wave {
+            Wave::Pulsed => samples(probe, spectral),
+            Wave::Continuous => 0..probe.samples,
+        },
         renewed: true,
     }
 }
@@ -44,6 +54,8 @@ pub fn record(
 ) -> Result<(Vec<Complex<f64>>, u32), SimError> {
     let spectral = scene.spectral.clone();
     let at_once = (spectral.prf * STILL).round().clamp(1.0, MOST) as usize;
+    // Of a continuous wave the sum, as loud as the gate would be: the phase of an echo is that of its place, whatever the pulse.
+    let length = samples(&scene.probe, &spectral).len() as f64;
     let mut echoes = Vec::with_capacity(pulses);
     let mut index = first;
     while echoes.len() < pulses {
@@ -52,7 +64,7 @@ pub fn record(
         let made = simulator.packet(scene, index, &packet)?;
         let mean = |gate: &[[f32; 2]]| {
             let all = gate.iter().map(|&[re, im]| Complex::new(f64::from(re), f64::from(im)));
-            all.sum::<Complex<f64>>() / gate.len() as f64
+            all.sum::<Complex<f64>>() / length
         };
         echoes.extend(made.chunks_exact(packet.samples.len()).map(mean));
         index = index.wrapping_add(1);

@@ -14,7 +14,59 @@ use crate::settings::Spectral;
 /// Fewest bins of a spectrum.
 const FEWEST_BINS: usize = 256;
 
-/// Spectra against time.
+/// Spectra as they come: a bin for each frequency, from 0 up to half of the PRF, then from below that up to 0.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Spectra {
+    /// Time of the middle of each, s.
+    pub times: Vec<f64>,
+    /// Power of each bin of each spectrum, bins of a spectrum next to each other. White noise has its own power.
+    pub power: Vec<f32>,
+}
+
+impl Spectra {
+    /// The bins of each in turn, of spectra with these settings.
+    pub fn columns(&self, spectral: &Spectral) -> impl ExactSizeIterator<Item = &[f32]> {
+        self.power.chunks_exact(bins(spectral))
+    }
+
+    /// The spectra with a velocity for each bin, as settings show them: `baseline`, `invert` and `angle` may be others than those
+    /// with which they were made.
+    pub fn shown(&self, probe: &Probe, spectral: &Spectral) -> Spectrogram {
+        let bins = bins(spectral);
+        // The middle of what is shown lies so many bins above that of frequencies.
+        let up = if spectral.invert { -spectral.baseline } else { spectral.baseline };
+        let lowest = (up / 2.0 * bins as f64).round() as i64 - (bins / 2) as i64;
+        let fastest = nyquist(probe, spectral.prf) / spectral.angle.cos();
+        let velocity = |j: usize| 2.0 * fastest * (lowest + j as i64) as f64 / bins as f64;
+        let mut velocities: Vec<f64> = (0..bins).map(velocity).collect();
+        let first = lowest.rem_euclid(bins as i64) as usize;
+        let mut power = Vec::with_capacity(self.power.len());
+        for column in self.columns(spectral) {
+            let rising = (0..bins).map(|j| column[(j + first) % bins]);
+            match spectral.invert {
+                true => power.extend(rising.rev()),
+                false => power.extend(rising),
+            }
+        }
+        if spectral.invert {
+            velocities.reverse();
+            velocities.iter_mut().for_each(|v| *v = -*v);
+        }
+        Spectrogram { velocities, times: self.times.clone(), power }
+    }
+}
+
+/// Pulses of one spectrum.
+pub fn pulses(spectral: &Spectral) -> usize {
+    (spectral.window * spectral.prf).round().max(2.0) as usize
+}
+
+/// Bins of one spectrum.
+pub fn bins(spectral: &Spectral) -> usize {
+    (2 * pulses(spectral)).next_power_of_two().max(FEWEST_BINS)
+}
+
+/// Spectra against time, with their velocities.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Spectrogram {
     /// Velocity of each bin, mm/s, corrected for the angle, rising; above 0 what comes towards the probe, or, inverted, what goes.
@@ -44,53 +96,39 @@ pub struct Analyser {
     /// Sum of the window's squares.
     energy: f64,
     fft: Arc<dyn Fft<f64>>,
+    bins: usize,
     /// Filtered echoes from the beginning of the next spectrum on.
     waiting: Vec<Complex<f64>>,
     /// Number of the first of them.
     first: usize,
-    /// Bins by which the lowest velocity lies beside the lowest frequency.
-    shift: usize,
-    inverted: bool,
     prf: f64,
     rate: f64,
-    made: Spectrogram,
+    /// Number of spectra made.
+    count: usize,
+    made: Spectra,
 }
 
 impl Analyser {
-    /// An analyser with these settings, for a probe.
-    pub fn new(probe: &Probe, spectral: &Spectral) -> Self {
-        let length = (spectral.window * spectral.prf).round().max(2.0) as usize;
+    /// An analyser with these settings.
+    pub fn new(spectral: &Spectral) -> Self {
+        let length = pulses(spectral);
         // Hann's window.
         let window: Vec<f64> = (0..length)
             .map(|n| 0.5 - 0.5 * (TAU * (n as f64 + 0.5) / length as f64).cos())
             .collect();
-        let bins = (2 * length).next_power_of_two().max(FEWEST_BINS);
-        // The middle of what is shown lies so many bins above that of frequencies.
-        let up = if spectral.invert { -spectral.baseline } else { spectral.baseline };
-        let shift = (up / 2.0 * bins as f64).round();
-        let fastest = nyquist(probe, spectral.prf) / spectral.angle.cos();
-        let velocity = |j: usize| {
-            let bin = j as f64 - (bins / 2) as f64 + shift;
-            2.0 * fastest * bin / bins as f64
-        };
-        let mut velocities: Vec<f64> = (0..bins).map(velocity).collect();
-        if spectral.invert {
-            velocities.reverse();
-            velocities.iter_mut().for_each(|v| *v = -*v);
-        }
-        let lowest = shift as i64 - (bins / 2) as i64;
+        let bins = bins(spectral);
         Self {
             filter: WallFilter::new(spectral.wall_filter, spectral.prf),
             energy: window.iter().map(|w| w * w).sum(),
             window,
             fft: FftPlanner::new().plan_fft_forward(bins),
+            bins,
             waiting: Vec::new(),
             first: 0,
-            shift: lowest.rem_euclid(bins as i64) as usize,
-            inverted: spectral.invert,
             prf: spectral.prf,
             rate: spectral.columns,
-            made: Spectrogram { velocities, ..Spectrogram::default() },
+            count: 0,
+            made: Spectra::default(),
         }
     }
 
@@ -98,7 +136,7 @@ impl Analyser {
     pub fn add(&mut self, echoes: &[Complex<f64>]) {
         self.waiting.extend(echoes.iter().map(|&echo| self.filter.next(echo)));
         loop {
-            let begin = (self.made.times.len() as f64 / self.rate * self.prf).round() as usize;
+            let begin = self.next();
             let from = begin - self.first;
             if from + self.window.len() > self.waiting.len() {
                 break;
@@ -106,35 +144,30 @@ impl Analyser {
             self.spectrum(from);
             let middle = begin as f64 + (self.window.len() as f64 - 1.0) / 2.0;
             self.made.times.push(middle / self.prf);
+            self.count += 1;
         }
-        let next = (self.made.times.len() as f64 / self.rate * self.prf).round() as usize;
-        let done = (next - self.first).min(self.waiting.len());
+        let done = (self.next() - self.first).min(self.waiting.len());
         self.waiting.drain(..done);
         self.first += done;
     }
 
+    /// Number of the first echo of the next spectrum.
+    fn next(&self) -> usize {
+        (self.count as f64 / self.rate * self.prf).round() as usize
+    }
+
     /// Adds the spectrum of the waiting echoes from one on.
     fn spectrum(&mut self, from: usize) {
-        let bins = self.made.velocities.len();
         let own = self.waiting[from..].iter().zip(&self.window).map(|(echo, weight)| echo * weight);
         let mut values: Vec<Complex<f64>> = own.collect();
-        values.resize(bins, Complex::default());
+        values.resize(self.bins, Complex::default());
         self.fft.process(&mut values);
-        let power = |j: usize| {
-            let up = if self.inverted { bins - 1 - j } else { j };
-            (values[(up + self.shift) % bins].norm_sqr() / self.energy) as f32
-        };
-        self.made.power.extend((0..bins).map(power));
+        self.made.power.extend(values.iter().map(|v| (v.norm_sqr() / self.energy) as f32));
     }
 
-    /// The spectra made so far.
-    pub fn made(&self) -> &Spectrogram {
-        &self.made
-    }
-
-    /// Takes the spectra made so far; those made later follow them.
-    pub fn finish(self) -> Spectrogram {
-        self.made
+    /// Takes the spectra made since the last call; times are from the first echo. Those made later follow them.
+    pub fn take(&mut self) -> Spectra {
+        std::mem::take(&mut self.made)
     }
 }
 

@@ -1,17 +1,32 @@
-//! Settings of pulsed-wave Doppler: where the gate lies, how often it is asked, and how its spectra are shown.
+//! Settings of spectral Doppler, pulsed and continuous: where the gate lies, how often it is asked, and how its spectra are shown.
 
 use super::units::{ANGLE, DURATION, LENGTH, LEVEL, RATE};
-use super::{Probe, group};
+use super::{Probe, group, words};
 
 /// Fewest pulses of a spectrum.
 const FEWEST: f64 = 8.0;
 /// Most pulses of a recording.
 const MOST: f64 = 1e6;
 
+words! {
+    /// How flow is listened to.
+    #[derive(Default)]
+    pub enum Wave {
+        /// By pulses: what lies in the gate is heard.
+        #[default]
+        Pulsed = "pulsed",
+        /// By a wave without an end: all along the line is heard, and no velocity is too fast for its depth.
+        Continuous = "continuous",
+    }
+}
+
 group! {
-    /// Pulsed-wave Doppler.
+    /// Spectral Doppler.
     pub struct Spectral in "spectral" {
-        /// Pulses per second (PRF). Velocities beyond the speed of sound times this over four times the frequency fold over.
+        /// Pulsed wave, which hears the gate; or continuous wave, which hears all of its line, whatever the depth lets pulses do.
+        wave: Wave = Wave::Pulsed, Facts::word::<Wave>().label("Wave");
+        /// Pulses per second (PRF); of a continuous wave, how often it is sampled. Velocities beyond the speed of sound times this over
+        /// four times the frequency fold over.
         prf: f64 = 5000.0,
             Facts::quantity(&RATE, 100.0, 1e5).label("PRF").usual(500.0, 15_000.0);
         /// Place of the gate across the image: its line, over the scanlines.
@@ -44,6 +59,12 @@ group! {
 impl Spectral {
     /// What is wrong with these settings for a probe: the key at fault, the cause, and the remedy. None where they fit.
     pub fn fault(&self, probe: &Probe) -> Option<(&'static str, String, String)> {
+        let ranged = || self.fault_in_range(probe).filter(|_| self.wave == Wave::Pulsed);
+        ranged().or_else(|| self.fault_in_time())
+    }
+
+    /// What is wrong with the place of the gate.
+    fn fault_in_range(&self, probe: &Probe) -> Option<(&'static str, String, String)> {
         let [top, bottom] = [-0.5, 0.5].map(|end| self.depth + end * self.gate);
         if top < 0.0 || bottom > probe.depth {
             let message = format!(
@@ -62,9 +83,16 @@ impl Spectral {
             return Some((
                 "prf",
                 message,
-                format!("at most {most:.0} Hz, or a gate nearer to the face"),
+                format!(
+                    "at most {most:.0} Hz, or a gate nearer to the face; `wave = \"continuous\"` has no such limit"
+                ),
             ));
         }
+        None
+    }
+
+    /// What is wrong with the times of pulses and spectra.
+    fn fault_in_time(&self) -> Option<(&'static str, String, String)> {
         let pulses = self.window * self.prf;
         if pulses < FEWEST {
             let message = format!("a spectrum would be made of {pulses:.0} pulses");

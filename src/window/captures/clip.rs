@@ -33,8 +33,8 @@ pub(crate) struct Clip {
     pub(crate) format: Format,
     /// Head of its DICOM file.
     pub(crate) about: About,
-    /// The M-mode strip, while it is drawn.
-    pub(crate) strip: Option<SavedStrip>,
+    /// The strips that are drawn.
+    pub(crate) strips: Vec<SavedStrip>,
 }
 
 /// A clip being written.
@@ -85,7 +85,7 @@ impl Clip {
         }
         let mut sidecar = self.sidecar;
         sidecar.insert("file".into(), files::name(&target));
-        if let Some(strip) = self.strip {
+        for strip in self.strips {
             strip.write(&mut claim, &mut sidecar)?;
         }
         claim.keep(&sidecar)?;

@@ -29,7 +29,7 @@ impl Claim {
         for number in 1.. {
             let base = format!("{stem}-{number:04}");
             let is_taken = |end: &str| folder.join(format!("{base}{end}")).exists();
-            if ["", ".png", ".gif", ".mp4", ".dcm", "-marked.png", "-mmode.png"]
+            if ["", ".png", ".gif", ".mp4", ".dcm", "-marked.png", "-mmode.png", "-spectrum.png"]
                 .into_iter()
                 .any(is_taken)
             {

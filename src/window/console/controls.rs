@@ -29,7 +29,7 @@ pub(super) fn grid(ui: &mut Ui, id: &str, add: impl FnOnce(&mut Ui)) {
 pub(super) type Special<'s, T> = &'s mut dyn FnMut(&mut Ui, &Facts, &mut T) -> bool;
 
 /// Draws the controls of all settings of a group, its sections one below the other. `path` is its table.
-pub(super) fn group<T: Group>(ui: &mut Ui, path: &str, settings: &mut T) {
+pub(crate) fn group<T: Group>(ui: &mut Ui, path: &str, settings: &mut T) {
     group_with(ui, path, settings, &mut |_, _, _| false);
 }
 

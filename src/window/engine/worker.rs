@@ -2,6 +2,7 @@
 
 mod columns;
 mod pictures;
+mod spectra;
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -24,6 +25,7 @@ use crate::sim::shaders::Library;
 use crate::sim::{self, SimError, Simulator, Tracer};
 use crate::wake::Wake;
 use columns::Columns;
+use spectra::Gate;
 
 /// The last picture, and the state that it left on the device.
 struct Imaged {
@@ -80,6 +82,8 @@ pub(super) struct Worker {
     pace: Pace,
     /// Columns of the M-mode strip.
     columns: Columns,
+    /// Spectra of pulsed-wave Doppler.
+    gate: Gate,
     /// End and duration of the last picture of the anatomy.
     view3d_made: (Instant, Duration),
     wake: Wake,
@@ -116,6 +120,7 @@ impl Worker {
             left: None,
             pace: Pace::new(machine),
             columns: Columns::new(),
+            gate: Gate::default(),
             view3d_made: (Instant::now(), Duration::ZERO),
             wake,
         }
@@ -134,13 +139,14 @@ impl Worker {
                     continue;
                 }
                 Job::Image(order) => self.taken(order, index),
-                Job::Columns(order) => {
+                Job::Strips(order) => {
                     let taken = self.taken(order, index);
-                    let news = match self.columns(&mut simulator, &taken) {
+                    let news = match self.strips(&mut simulator, &taken) {
                         Ok(Some(Film::Columns(aim, columns))) => {
                             let probe = taken.order.settings.probe.clone();
                             Ok(News::Columns(Box::new(probe), aim, columns))
                         }
+                        Ok(Some(_)) if Self::has_spectra(&taken.order) => continue,
                         // The strip has none of its own: an image is due.
                         Ok(_) => {
                             self.took = Duration::ZERO;
@@ -193,7 +199,7 @@ impl Worker {
                 },
             };
             index += u32::from(taken.level.is_none());
-            let film = self.columns(&mut simulator, &taken);
+            let film = self.strips(&mut simulator, &taken);
             let frame = film.and_then(|film| self.carry_out(&mut simulator, &taken, film));
             match (&frame, &mut self.left) {
                 (Err(SimError::Gpu(GpuError::Abandoned)), _) => continue,
@@ -215,6 +221,18 @@ impl Worker {
                 return;
             }
         }
+    }
+
+    /// Tells the spectra, and makes what the M-mode strip gets: see [`Self::columns`].
+    fn strips(
+        &mut self,
+        simulator: &mut Option<(Simulator, Tracer)>,
+        taken: &Taken,
+    ) -> Result<Option<Film>, SimError> {
+        if let Some(heard) = self.spectra(simulator, taken)? {
+            self.tell(News::Spectra(Box::new(heard)));
+        }
+        self.columns(simulator, taken)
     }
 
     /// Pictures the anatomy; returns whether there will be more. A picture begun because something moves is finished,
@@ -331,8 +349,9 @@ impl Worker {
                 }
                 let again = running.expect("an order, or a running one").again(Instant::now());
                 let stands = (STRIP_PUT_OFF * self.took).min(STRIP_LONGEST);
-                return Some(match self.has_columns(&again) && self.imaged.elapsed() < stands {
-                    true => Job::Columns(again),
+                let strips = self.has_columns(&again) || Self::has_spectra(&again);
+                return Some(match strips && self.imaged.elapsed() < stands {
+                    true => Job::Strips(again),
                     false => Job::Image(again),
                 });
             }

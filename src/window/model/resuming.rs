@@ -63,6 +63,7 @@ impl Model {
         self.noted_marks = std::mem::take(&mut old.noted_marks);
         self.body = old.body;
         self.mmode = old.mmode.take();
+        self.spectrum = old.spectrum.take();
         self.history = std::mem::take(&mut old.history);
         let names = |model: &Self| -> Vec<_> {
             let tissues = model.settings.tissues.iter().map(|tissue| tissue.name.clone());

@@ -11,7 +11,7 @@ use crate::picture::Frame;
 use crate::place::Place;
 use crate::statistics::{Sample, Times};
 use crate::timing::costs;
-use crate::{acts, mmode, real};
+use crate::{acts, mmode, real, spectrum};
 
 /// Number of images of an animation after which a screenshot is taken.
 const SETTLED: usize = 24;
@@ -114,9 +114,12 @@ impl Open {
                 None
             }
         };
-        let strip = || mmode::saved(model, &state.panels.mmode);
+        let strips = || {
+            let line = mmode::saved(model, &state.panels.mmode);
+            line.into_iter().chain(spectrum::saved(model, &mut state.panels.spectrum)).collect()
+        };
         let study = || state.panels.exam.study(model.settings.imaging.exam);
-        state.common.tools.save(model, marked, strip, study);
+        state.common.tools.save(model, marked, strips, study);
         Ok(())
     }
 

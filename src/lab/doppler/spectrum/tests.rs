@@ -37,9 +37,9 @@ fn random(state: &mut u64) -> f64 {
 }
 
 fn made(spectral: &Spectral, echoes: &[Complex<f64>]) -> Spectrogram {
-    let mut analyser = Analyser::new(&settings().0, spectral);
+    let mut analyser = Analyser::new(spectral);
     analyser.add(echoes);
-    analyser.finish()
+    analyser.take().shown(&settings().0, spectral)
 }
 
 /// Velocity of the loudest bin of each spectrum.
@@ -107,11 +107,11 @@ fn noise_keeps_its_power_and_pieces_make_what_the_whole_makes() {
     let whole = made(&spectral, &echoes);
     let mean = whole.power.iter().map(|&p| f64::from(p)).sum::<f64>() / whole.power.len() as f64;
     assert!((mean - 2.0).abs() < 0.03, "{mean}");
-    let mut analyser = Analyser::new(&settings().0, &spectral);
+    let mut analyser = Analyser::new(&spectral);
     for part in echoes.chunks(37) {
         analyser.add(part);
     }
-    assert!(analyser.finish() == whole);
+    assert!(analyser.take().shown(&settings().0, &spectral) == whole);
     // The first and the last one lie half a window within.
     let ends = [whole.times[0], 10.0 - whole.times[whole.times.len() - 1]];
     assert!(ends.iter().all(|t| *t >= spectral.window / 2.0 - 1e-3 && *t < 0.012), "{ends:?}");

@@ -1,0 +1,122 @@
+//! Pulsed-wave Doppler in the window: its strip, its gate in the image, and what is saved.
+
+use super::brightness;
+use super::desk::{Desk, Key};
+use super::tools::sidecar;
+
+/// Blood that flows away from the probe, through a vessel across a small image, and a gate in its middle.
+const SCENE: &str = r#"name = "Vessel"
+background = "muscle"
+
+[probe]
+preset = "linear"
+depth = "40 mm"
+scanlines = 64
+samples = 768
+elevation_layers = 1
+
+[imaging]
+image_height = 400
+
+[spectral]
+depth = "20 mm"
+gate = "2 mm"
+angle = "60 deg"
+prf = "4 kHz"
+window = "30 ms"
+wall_filter = "50 Hz"
+
+[[mesh]]
+name = "vessel"
+shape = { cylinder = { radius = 5, length = 100, segments = 48 } }
+tissue = "blood"
+priority = 1
+translate = [0, 0, 20]
+rotate = { axis = [0, 1, 0], angle = "60 deg" }
+
+[[flow]]
+name = "vessel"
+mesh = "vessel"
+line = { from = [0, 0, -50], to = [0, 0, 50] }
+speed = "30 cm/s"
+"#;
+
+/// The key of the panel: F6.
+const SPECTRUM: Key = Key::Symbol(0xffc3);
+
+/// Part of the display with the strip of spectra below the image, and its middle. The console is closed.
+const STRIP: [u16; 4] = [330, 430, 850, 190];
+/// The gate's middle in the image, without the 3D view.
+const GATE: (u16, u16) = (653, 238);
+
+fn open(arguments: &[&str]) -> Option<Desk> {
+    let mut desk = Desk::open(SCENE, arguments)?;
+    desk.wait_for("an image", |d| brightness(&d.grab([200, 100, 300, 400])) > 5.0);
+    // Room for the strip: neither the 3D view nor the console.
+    desk.press(Key::Letter('v'));
+    desk.press(Key::Letter('c'));
+    Some(desk)
+}
+
+#[test]
+fn spectra_are_drawn_measured_and_saved() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let captures = folder.path().join("captures");
+    let Some(mut desk) = open(&["--validate", "--captures", captures.to_str().expect("plain")])
+    else {
+        return;
+    };
+    desk.press(SPECTRUM);
+    desk.wait_for("spectra", |d| brightness(&d.grab(STRIP)) > 4.0);
+    desk.press(Key::F2);
+    let still = sidecar(&mut desk, &captures, "vessel-0001.json");
+    let said = &still["spectrum"];
+    assert_eq!((&said["above_baseline"], &said["wave"]), (&"towards".into(), &"pulsed".into()));
+    assert!(said["spectra"].as_u64() >= Some(1), "{still}");
+    let edges: Vec<f64> = (said["velocity_mm_per_s"].as_array().expect("two").iter())
+        .map(|edge| edge.as_f64().expect("a number"))
+        .collect();
+    let file = captures.join(said["file"].as_str().expect("a name"));
+    let saved = image::open(file).expect("a picture").to_luma8();
+    let rows: Vec<f64> =
+        (saved.rows()).map(|row| row.map(|pixel| f64::from(pixel.0[0])).sum()).collect();
+    // The middle of what is seen: 30 cm/s away from the probe, in the middle of the vessel; a little less in all of the gate.
+    let apart = (edges[1] - edges[0]) / (rows.len() - 1) as f64;
+    let all: f64 = rows.iter().sum();
+    let moment: f64 =
+        rows.iter().zip(0..).map(|(sum, y)| sum * (edges[0] + apart * f64::from(y))).sum();
+    let middle = moment / all;
+    assert!((-330.0..-240.0).contains(&middle), "{middle}");
+    desk.quit();
+}
+
+/// The value of a key of the table `[spectral]` in the scene file.
+fn value(desk: &Desk, key: &str) -> Option<String> {
+    let text = desk.scene();
+    let table = text.split("[spectral]").nth(1)?;
+    let table = table.split("\n[").next()?;
+    let line = table.lines().find(|line| line.starts_with(&format!("{key} = ")))?;
+    Some(line.split(" = ").nth(1)?.trim().to_owned())
+}
+
+#[test]
+fn the_gate_is_dragged_and_undone() {
+    let Some(mut desk) = open(&["--validate"]) else {
+        return;
+    };
+    // Blood stands still for it.
+    desk.press(Key::Letter('p'));
+    desk.press(SPECTRUM);
+    desk.wait_for("the strip", |d| brightness(&d.grab(STRIP)) > 1.0);
+    let (x, y) = GATE;
+    desk.drag(GATE, (x - 50, y + 40));
+    desk.hold_control(Key::Letter('s'));
+    desk.wait_for("a gate elsewhere", |d| value(d, "depth").is_some_and(|v| v != "\"20 mm\""));
+    assert!(value(&desk, "line").is_some());
+    desk.hold_control(Key::Letter('z'));
+    desk.hold_control(Key::Letter('s'));
+    desk.wait_for("the gate before", |d| {
+        value(d, "depth").is_some_and(|v| v.starts_with("20") || v.starts_with("\"20"))
+    });
+    desk.quit();
+}
