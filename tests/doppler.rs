@@ -126,6 +126,7 @@ fn a_gate_is_seen_measured_and_heard() {
         "spectral.window=30 ms",
         "spectral.duration=0.5 s",
         "spectral.wall_filter=50 Hz",
+        "spectral.gain=45 dB",
     ];
     let set = gate.iter().flat_map(|set| ["--set", *set]);
     let more: Vec<&str> = ["--mode", "pw", "--sound", sound].into_iter().chain(set).collect();

@@ -1,10 +1,13 @@
 //! Packets of pulses: what does not flow is the image's, and what flows is that of images at the pulses' times.
 
+use std::f64::consts::PI;
+
+use insonify::doppler::{make_packet, nyquist};
 use insonify::gpu::test_device;
 use insonify::scene::flow::{CentreLine, Course, Flow, FlowShape};
 use insonify::scene::{Scene, shapes};
 use insonify::sim::shaders::Library;
-use insonify::sim::{Packet, Simulator, Tracer};
+use insonify::sim::{ColourMode, Packet, Simulator, Tracer};
 
 use glam::{DAffine3, DVec3};
 
@@ -134,4 +137,61 @@ fn without_flow_all_pulses_are_the_image_and_noise_tells_them_apart() {
     let pulses: Vec<_> = pulses.chunks(still.len()).collect();
     assert!(pulses[0] == noisy, "the first has the image's");
     assert!(pulses[1] != noisy && pulses[1] != pulses[2]);
+}
+
+/// Tissue that moves as one body along the scanlines: its velocity by the phases of successive pulses is that of its trajectory
+/// within 2 %, at several moments of its way.
+#[test]
+fn tissue_doppler_is_the_velocity_of_a_body_that_moves() {
+    let text = r#"
+background = "water"
+[probe]
+preset = "linear"
+depth = "40 mm"
+scanlines = 64
+samples = 1024
+elevation_layers = 1
+[doppler]
+left = 0.3
+right = 0.7
+top = 0.35
+bottom = 0.65
+[[transform]]
+name = "way"
+motion = { kind = "sine", period = "1 s", translate = [0, 0, 3] }
+[[mesh]]
+name = "body"
+parent = "way"
+shape = { box = { size = [60, 40, 24] } }
+tissue = "liver"
+translate = [0, 0, 20]
+"#;
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("scene.toml");
+    std::fs::write(&file, text).expect("written");
+    let (mut scene, _) = Scene::load(&file, &[]).expect("a scene");
+    let mut simulator = simulator(&scene, Tracer::Bvh);
+    let settings = ColourMode::Tissue.doppler(&scene.settings);
+    let fastest = nyquist(&scene.probe, settings.prf);
+    let mut heard = |mode: ColourMode, seconds: f64| {
+        scene.set_time(seconds);
+        let made = make_packet(&mut simulator, &mut scene, seconds, 0, mode, &settings);
+        let pulses = made.expect("a packet").times.len();
+        let echoes = simulator.pulses().expect("echoes");
+        let each = echoes.len() / pulses;
+        let pairs = echoes.iter().zip(&echoes[each..]);
+        let sum = pairs.fold([0.0; 2], |[re, im], (a, b)| {
+            let [a, b] = [a, b].map(|z| z.map(f64::from));
+            [re + b[0] * a[0] + b[1] * a[1], im + b[1] * a[0] - b[0] * a[1]]
+        });
+        // Towards the probe; along the scanlines is away from it.
+        -fastest * sum[1].atan2(sum[0]) / PI
+    };
+    for seconds in [0.0, 0.1, 0.4, 0.6] {
+        let expected = 3.0 * 2.0 * PI * (2.0 * PI * seconds).cos();
+        let found = heard(ColourMode::Tissue, seconds);
+        assert!((found / expected - 1.0).abs() < 0.02, "{seconds}: {found} {expected}");
+    }
+    // The planted error: tissue that stands still from pulse to pulse.
+    assert!(heard(ColourMode::Color, 0.0).abs() < 0.5);
 }

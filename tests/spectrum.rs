@@ -125,7 +125,7 @@ fn a_continuous_wave_has_no_depth_and_no_fastest_velocity() {
     let mut simulator = simulator(&scene);
     let mut heard = |spectral: &Spectral| {
         scene.spectral.clone_from(spectral);
-        record(&mut simulator, &mut scene, 0.0, 900, 0).expect("echoes").0
+        record(&mut simulator, &mut scene, 0.0, 600, 0).expect("echoes").0
     };
     let echoes = heard(&spectral);
     let mean = |spectral: &Spectral, echoes: &Vec<_>| {

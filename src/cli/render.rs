@@ -9,60 +9,29 @@ use super::common::{self, Common, Progress, Stage};
 use insonify::gpu::{Device, FrameTimings, peak_bytes};
 use insonify::output;
 use insonify::scene::{Scene, file, shipped};
-use insonify::settings::{Group as _, ScatterMode, Simulation, Wave};
+use insonify::settings::{Group as _, ScatterMode, Simulation};
 use insonify::sim::calibration::Calibration;
 use insonify::sim::contact::{REACH_SKIN, UNTOUCHED};
 use insonify::sim::dump;
 use insonify::sim::facts;
 use insonify::sim::shaders::Library;
-use insonify::sim::{ColourMode, Shot, Simulator, Tracer};
+use insonify::sim::{Shot, Simulator, Tracer};
 use insonify::statistics::Statistics;
 
 mod coloured;
 mod film;
 mod labels;
+mod mode;
 mod moments;
 mod spectrum;
 
 use film::Film;
 use labels::LabelFiles;
+use mode::Mode;
 use moments::{Moment, groups, moments, pace};
 
 /// Frames per second of an animation whose scene time stands still.
 const SHOWN: f64 = 10.0;
-
-/// Doppler modes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum Mode {
-    /// Velocity in colours over the image.
-    Color,
-    /// Power of what moves in colours over the image.
-    Power,
-    /// Pulsed wave: spectra of a gate against time.
-    Pw,
-    /// Continuous wave: spectra of a whole line against time.
-    Cw,
-}
-
-impl Mode {
-    /// The colours over an image; none of a mode without one.
-    fn colours(self) -> Option<ColourMode> {
-        match self {
-            Self::Color => Some(ColourMode::Color),
-            Self::Power => Some(ColourMode::Power),
-            Self::Pw | Self::Cw => None,
-        }
-    }
-
-    /// How a spectral mode listens; none of one with an image.
-    fn wave(self) -> Option<Wave> {
-        match self {
-            Self::Color | Self::Power => None,
-            Self::Pw => Some(Wave::Pulsed),
-            Self::Cw => Some(Wave::Continuous),
-        }
-    }
-}
 
 /// Arguments of `insonify render`.
 #[derive(Debug, clap::Args)]
@@ -102,7 +71,8 @@ pub struct Render {
     #[arg(long, value_name = "FILE")]
     labels: Option<PathBuf>,
     /// Doppler. Colours the image by a packet of pulses in the colour box of the scene's [doppler]: `color` shows velocities, red
-    /// towards the probe and blue away from it, `power` how much moves. `pw` records the gate of [spectral] instead of an
+    /// towards the probe and blue away from it, `power` how much moves, `tdi` how fast tissue moves (keys:
+    /// [tissue_doppler]). `pw` records the gate of [spectral] instead of an
     /// image, and shows its spectra against time, `cw` all of the gate's line by a continuous wave; NAME.json says what is measured on them. PNG only.
     #[arg(long, value_enum, conflicts_with = "dump")]
     mode: Option<Mode>,
@@ -152,14 +122,14 @@ pub fn run(args: &Render) -> Result<()> {
     if let Some(wave) = wave {
         scene.spectral.wave = wave;
     }
-    match args.mode {
-        Some(mode) if mode.wave().is_some() => spectrum::check(args, &output, &scene)?,
-        Some(_) => {
+    match (wave, args.mode.and_then(Mode::colours)) {
+        (Some(_), _) => spectrum::check(args, &output, &scene)?,
+        (None, Some(colours)) => {
             spectrum::check_silent(args)?;
             film::check_colour(&output)?;
-            coloured::check(&scene)?;
+            coloured::check(&scene, colours)?;
         }
-        None => {}
+        (None, None) => {}
     }
     if let Some(packet) = &args.packet {
         coloured::check_packet(packet)?;

@@ -8,13 +8,42 @@ pub mod trace;
 use std::ops::Range;
 
 use crate::probe::Probe;
+use crate::scene::Scene;
 use crate::settings::Doppler;
-use crate::sim::Packet;
+use crate::sim::{ColourMode, Packet, SimError, Simulator};
 
 /// The velocity, mm/s, that turns an echo by half a turn from pulse to pulse: c PRF / (4 f).
 pub fn nyquist(probe: &Probe, prf: f64) -> f64 {
     // mm/us over MHz are mm.
     probe.speed / probe.frequency * prf / 4.0
+}
+
+/// Makes the packet of the colour box of a mode on the device, about `seconds`, the scene's time, with the settings that
+/// [`ColourMode::doppler`] has of the scene's, of which the pulses may be fewer. Of tissue each pulse is made at its own time.
+///
+/// # Errors
+/// Those of [`Simulator::frame`]; device out of memory.
+pub fn make_packet(
+    simulator: &mut Simulator,
+    scene: &mut Scene,
+    seconds: f64,
+    index: u32,
+    mode: ColourMode,
+    settings: &Doppler,
+) -> Result<Packet, SimError> {
+    let mut packet = packet(&scene.probe, settings);
+    match mode {
+        ColourMode::Color | ColourMode::Power => simulator.make_packet(scene, index, &packet)?,
+        ColourMode::Tissue => {
+            packet.renewed = true;
+            for (n, time) in packet.times.iter().enumerate() {
+                scene.set_time(seconds + time);
+                simulator.make_pulse(scene, index, &packet, n)?;
+            }
+            scene.set_time(seconds);
+        }
+    }
+    Ok(packet)
 }
 
 /// The packet of the box of these settings.

@@ -18,6 +18,7 @@ mod spectral;
 pub mod suggest;
 mod surface;
 mod tissue;
+mod tissue_doppler;
 pub mod units;
 mod value;
 mod words;
@@ -38,6 +39,7 @@ pub use simulation::{
 pub use spectral::{Spectral, Wave};
 pub use surface::Surface;
 pub use tissue::Tissue;
+pub use tissue_doppler::TissueDoppler;
 pub use value::{Value, plain};
 pub use words::Words;
 pub(crate) use words::words;
@@ -96,8 +98,10 @@ settings! {
     processing: Processing;
     /// Colour Doppler.
     doppler: Doppler;
-    /// Pulsed-wave Doppler.
+    /// Spectral Doppler.
     spectral: Spectral;
+    /// Tissue Doppler.
+    tissue_doppler: TissueDoppler;
 }
 
 impl Settings {

@@ -7,7 +7,7 @@ use super::stages::colour::{COLOURED, Work};
 use super::{Correlation, Packet, SimError, Simulator};
 use crate::gpu::Image;
 use crate::scene::Scene;
-use crate::settings::{Doppler, VelocityMap};
+use crate::settings::{Doppler, Group, Settings, TissueDoppler, VelocityMap};
 
 /// Quantity that the colours of an image show.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,6 +16,37 @@ pub enum ColourMode {
     Color,
     /// Power of what moves, from dark red to yellow.
     Power,
+    /// Velocity of tissue, in the colours of velocities.
+    Tissue,
+}
+
+impl ColourMode {
+    /// The settings by which a mode colours: of tissue those of `[tissue_doppler]`, with the box and the colours of `[doppler]`.
+    pub fn doppler(self, settings: &Settings) -> Doppler {
+        match self {
+            Self::Color | Self::Power => settings.doppler.clone(),
+            Self::Tissue => settings.tissue_doppler.of(&settings.doppler),
+        }
+    }
+
+    /// What is wrong with these settings: path of the key at fault, the cause, and the remedy. None where they fit.
+    pub fn fault(self, settings: &Settings) -> Option<(String, String, String)> {
+        let (key, message, remedy) = self.doppler(settings).fault(&settings.probe)?;
+        let table = match self == Self::Tissue && TissueDoppler::row(key).is_some() {
+            true => TissueDoppler::TABLE,
+            false => Doppler::TABLE,
+        };
+        Some((format!("{table}.{key}"), message, remedy))
+    }
+
+    /// What its colours show, in a word.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Color => "velocity",
+            Self::Power => "power",
+            Self::Tissue => "tissue velocity",
+        }
+    }
 }
 
 /// Colours of a mode, RGB: [`COLOUR_ROWS`] rows of [`COLOUR_COLUMNS`]. Columns are velocities towards the probe, evenly from the
@@ -27,7 +58,7 @@ pub fn colour_map(mode: ColourMode, doppler: &Doppler) -> Vec<[u8; 3]> {
         (0..COLOUR_COLUMNS).map(move |column| {
             let share = (f64::from(column) + 0.5) / f64::from(COLOUR_COLUMNS);
             match mode {
-                ColourMode::Color => velocity_colour(doppler, share, row),
+                ColourMode::Color | ColourMode::Tissue => velocity_colour(doppler, share, row),
                 ColourMode::Power => {
                     let away = doppler.directional && (row < 0.5) != doppler.invert;
                     hue(away, share, None)
@@ -80,7 +111,7 @@ pub fn polynomials(count: usize, order: u32) -> Vec<f32> {
 
 /// The work that the stages do on a packet of the colour box, as the settings of a scene and the mode say.
 fn work(scene: &Scene, mode: ColourMode, packet: &Packet) -> Work {
-    let (doppler, calibration) = (&scene.doppler, Calibration::new(scene));
+    let (doppler, calibration) = (&mode.doppler(&scene.settings), Calibration::new(scene));
     let count = packet.times.len();
     let polynomials = doppler.order().map_or_else(Vec::new, |order| polynomials(count, order));
     let [count, lines, samples] =

@@ -1,5 +1,7 @@
 //! The pulses of a packet made: the same scanlines again and again within milliseconds, of which what flows changes.
 
+use std::ops::Range;
+
 use super::lane::Shot;
 use super::layout::{AXIAL_REACH, Frame, PART_FLOWING, PART_PULSE, PART_STILL};
 use super::line::LineRange;
@@ -72,12 +74,43 @@ impl Simulator {
         index: u32,
         packet: &Packet,
     ) -> Result<(), SimError> {
+        assert!(!packet.times.is_empty(), "a packet without pulses");
+        self.make_pulses(scene, index, packet, 0..packet.times.len(), |n| packet.times[n])
+    }
+
+    /// Makes the pulse number `n` of a packet, of everything as it is at the scene's time, which is the pulse's: tissue has moved
+    /// since the one before. The others stay on the device as they were made. Costs a frame of these scanlines.
+    ///
+    /// # Errors
+    /// Those of [`Self::frame`]; device out of memory.
+    ///
+    /// # Panics
+    /// With scanlines or samples that the probe does not have, or without this pulse.
+    pub fn make_pulse(
+        &mut self,
+        scene: &Scene,
+        index: u32,
+        packet: &Packet,
+        n: usize,
+    ) -> Result<(), SimError> {
+        assert!(n < packet.times.len(), "a packet without pulse {n}");
+        self.make_pulses(scene, index, packet, n..n + 1, |_| 0.0)
+    }
+
+    /// Makes these pulses of a packet, each so many seconds from the scene's time.
+    fn make_pulses(
+        &mut self,
+        scene: &Scene,
+        index: u32,
+        packet: &Packet,
+        numbers: Range<usize>,
+        after: impl Fn(usize) -> f64,
+    ) -> Result<(), SimError> {
         self.passes.lanes[0].packets.holds = None;
         let Packet { times, lines, samples, renewed } = packet;
         let probe = &scene.probe;
         assert!(lines.start < lines.end && lines.end <= probe.scanlines, "scanlines {lines:?}");
         assert!(samples.start < samples.end && samples.end <= probe.samples, "samples {samples:?}");
-        assert!(!times.is_empty(), "a packet without pulses");
         self.adopt(scene)?;
         let beside = AXIAL_REACH as u32;
         let heard = samples.start.saturating_sub(beside)..samples.end + beside;
@@ -104,24 +137,25 @@ impl Simulator {
         let line_bytes = u64::from(frame.samples) * 8;
         let (first, volume) =
             (u64::from(frame.echo_first) * line_bytes, u64::from(frame.echo_lines) * line_bytes);
-        for (n, time) in times.iter().enumerate() {
+        for n in numbers.clone() {
+            let time = after(n);
             let pulse = |part: u32| match renewed {
                 true => Scatter { part, time: 0.0 },
-                false => Scatter { part: part | PART_PULSE, time: *time as f32 },
+                false => Scatter { part: part | PART_PULSE, time: time as f32 },
             };
             if *renewed {
-                passes.carry_on(&mut cmd, scene, *time)?;
+                passes.carry_on(&mut cmd, scene, time)?;
             }
-            if n == 0 || !once {
+            if n == numbers.start || !once {
                 passes.clear(&mut cmd, &sizes);
                 let part = if once { PART_STILL } else { PART_STILL | PART_FLOWING };
                 passes.echoes(&mut cmd, pulse(part), false)?;
             }
             let buffers = &passes.lanes[0].buffers;
             if once {
-                let (from, to) = match n {
-                    0 => (&scatter::VOLUME_ECHOES, &STILL_ECHOES),
-                    _ => (&STILL_ECHOES, &scatter::VOLUME_ECHOES),
+                let (from, to) = match n == numbers.start {
+                    true => (&scatter::VOLUME_ECHOES, &STILL_ECHOES),
+                    false => (&STILL_ECHOES, &scatter::VOLUME_ECHOES),
                 };
                 cmd.barrier(Stage::Compute, Stage::Transfer);
                 cmd.copy((&buffers[from], first), (&buffers[to], first), volume)?;

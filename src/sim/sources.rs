@@ -1,7 +1,7 @@
 //! The settings of which the tables on the device are made, and tables of settings used before.
 
 use crate::scene::{Scene, Surface, Tissue, Wire};
-use crate::settings::{Doppler, Settings, Spectral};
+use crate::settings::{Doppler, Settings, Spectral, TissueDoppler};
 use crate::tables::Tables;
 
 /// Tables of settings used before, kept because settings come back: live quality changes between levels.
@@ -44,6 +44,7 @@ impl Sources {
         settings.simulation.seed = 0;
         settings.doppler = Doppler::default();
         settings.spectral = Spectral::default();
+        settings.tissue_doppler = TissueDoppler::default();
         Self {
             settings,
             tissues: scene.tissues.clone(),

@@ -139,7 +139,8 @@ fn carry_out(
             model.colour = match model.colour {
                 None => Some(ColourMode::Color),
                 Some(ColourMode::Color) => Some(ColourMode::Power),
-                Some(ColourMode::Power) => None,
+                Some(ColourMode::Power) => Some(ColourMode::Tissue),
+                Some(ColourMode::Tissue) => None,
             };
             model.touch(now);
         }

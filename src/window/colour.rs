@@ -33,7 +33,7 @@ pub(super) fn is_shown(frame: &Frame, model: &Model) -> bool {
 /// The text about the packet of a coloured frame: fewer pulses than the settings ask for are said so.
 pub(super) fn said(frame: &Frame, model: &Model) -> Option<String> {
     let coloured = frame.coloured.as_ref().filter(|_| model.colour.is_some())?;
-    let asked = frame.settings.doppler.pulses;
+    let asked = coloured.mode.doppler(&frame.settings).pulses;
     Some(match coloured.pulses < asked {
         true => format!("{} of {asked} pulses", coloured.pulses),
         false => format!("{asked} pulses"),
@@ -43,13 +43,13 @@ pub(super) fn said(frame: &Frame, model: &Model) -> Option<String> {
 /// The reason why nothing can be coloured with the settings, and the remedy.
 pub(super) fn fault(model: &Model) -> Option<String> {
     let settings = &model.settings;
-    let fault = model.colour.and_then(|_| settings.doppler.fault(&settings.probe));
-    fault.map(|(key, message, remedy)| format!("doppler.{key}: {message}. Remedy: {remedy}."))
+    let fault = model.colour.and_then(|mode| mode.fault(settings));
+    fault.map(|(path, message, remedy)| format!("{path}: {message}. Remedy: {remedy}."))
 }
 
 /// Draws the colour bar of a frame: the highest velocity towards the probe on top, or the greatest power; variance to the right.
 pub(super) fn bar(painter: &Painter, place: Rect, frame: &Frame, coloured: &Coloured) {
-    let doppler = &frame.settings.doppler;
+    let doppler = &coloured.mode.doppler(&frame.settings);
     let map = colour_map(coloured.mode, doppler);
     let at = |row: u32, share: f32| {
         let column = ((1.0 - share) * COLOUR_COLUMNS as f32) as u32;
@@ -57,7 +57,7 @@ pub(super) fn bar(painter: &Painter, place: Rect, frame: &Frame, coloured: &Colo
         Color32::from_rgb(r, g, b)
     };
     let texts = match coloured.mode {
-        ColourMode::Color => {
+        ColourMode::Color | ColourMode::Tissue => {
             let cm = nyquist(&frame.probe, doppler.prf) / 10.0;
             let [lowest, highest] = doppler.velocities().map(|share| speed(share * cm));
             [highest, format!("{lowest}\ncm/s")]

@@ -186,6 +186,11 @@ fn switch(ui: &mut Ui, colour: &mut Option<ColourMode>) {
             (None, "Off", "The image alone"),
             (Some(ColourMode::Color), "Velocity", "How fast it flows, towards the probe and away"),
             (Some(ColourMode::Power), "Power", "How much flows"),
+            (
+                Some(ColourMode::Tissue),
+                "Tissue",
+                "How fast tissue moves, towards the probe and away",
+            ),
         ] {
             ui.selectable_value(colour, choice, name).on_hover_text(tip);
         }

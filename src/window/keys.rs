@@ -158,7 +158,11 @@ const BINDINGS: &[(&str, &[Binding], &str)] = &[
         &[(Key::B, false, Action::Real), (Key::I, false, Action::Layer)],
         "which pixels are real; tissues in colours",
     ),
-    ("F5", &[(Key::F5, false, Action::Colour)], "what flows in colours: velocity, power, off"),
+    (
+        "F5",
+        &[(Key::F5, false, Action::Colour)],
+        "colours: velocity and power of what flows, velocity of tissue, off",
+    ),
     // In the list they stand with the panels.
     ("", &[(Key::F1, false, Action::Panel(HELP)), (Key::Escape, false, Action::Close)], ""),
     // The interface handles these itself.

@@ -67,14 +67,10 @@ pub struct Coloured {
 impl Coloured {
     /// What is said of it beside a picture.
     pub(crate) fn json(&self, frame: &Frame) -> Value {
-        let (probe, doppler) = (&frame.probe, &frame.settings.doppler);
         json!({
-            "shows": match self.mode {
-                ColourMode::Color => "velocity",
-                ColourMode::Power => "power",
-            },
+            "shows": self.mode.word(),
             "pulses": self.pulses,
-            "nyquist_mm_per_s": nyquist(probe, doppler.prf),
+            "nyquist_mm_per_s": nyquist(&frame.probe, self.mode.doppler(&frame.settings).prf),
         })
     }
 }

@@ -154,6 +154,7 @@ fn each_section_sets_what_is_saved_and_undo_takes_it_back() {
         "Processing",
         "Doppler",
         "Spectral",
+        "Tissue_doppler",
         "Fusion",
         "Registration",
         "Tissues",

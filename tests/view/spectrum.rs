@@ -46,8 +46,15 @@ const SPECTRUM: Key = Key::Symbol(0xffc3);
 
 /// Part of the display with the strip of spectra below the image, and its middle. The console is closed.
 const STRIP: [u16; 4] = [330, 430, 850, 190];
+/// Part of the display with its controls, and the colour of panels.
+const CONTROLS: [u16; 4] = [0, 440, 316, 230];
+const PANEL: [u8; 3] = [27, 30, 34];
 /// The gate's middle in the image, without the 3D view.
 const GATE: (u16, u16) = (653, 238);
+
+fn backs(pixels: &[u8]) -> usize {
+    pixels.chunks_exact(3).filter(|pixel| *pixel == PANEL).count()
+}
 
 fn open(arguments: &[&str]) -> Option<Desk> {
     let mut desk = Desk::open(SCENE, arguments)?;
@@ -67,6 +74,7 @@ fn spectra_are_drawn_measured_and_saved() {
         return;
     };
     desk.press(SPECTRUM);
+    desk.wait_for("the panel", |d| backs(&d.grab(CONTROLS)) > 10_000);
     desk.wait_for("spectra", |d| brightness(&d.grab(STRIP)) > 4.0);
     desk.press(Key::F2);
     let still = sidecar(&mut desk, &captures, "vessel-0001.json");
@@ -107,6 +115,7 @@ fn the_gate_is_dragged_and_undone() {
     // Blood stands still for it.
     desk.press(Key::Letter('p'));
     desk.press(SPECTRUM);
+    desk.wait_for("the panel", |d| backs(&d.grab(CONTROLS)) > 10_000);
     desk.wait_for("the strip", |d| brightness(&d.grab(STRIP)) > 1.0);
     let (x, y) = GATE;
     desk.drag(GATE, (x - 50, y + 40));

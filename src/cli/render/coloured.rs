@@ -12,14 +12,17 @@ use insonify::output::npz::{self, Entry};
 use insonify::scene::Scene;
 use insonify::sim::{ColourMode, Correlation, Packet, Simulator};
 
+/// Key of the Nyquist velocity in what is said of a packet.
+const NYQUIST: &str = "nyquist_mm_per_s";
+
 /// Refuses settings with which nothing could be coloured.
 ///
 /// # Errors
 /// The fault with its remedy, if these settings cannot colour an image of this probe.
-pub fn check(scene: &Scene) -> Result<()> {
-    match scene.doppler.fault(&scene.probe) {
+pub fn check(scene: &Scene, mode: ColourMode) -> Result<()> {
+    match mode.fault(&scene.settings) {
         None => Ok(()),
-        Some((key, message, remedy)) => Err(miette!(help = remedy, "doppler.{key}: {message}")),
+        Some((path, message, remedy)) => Err(miette!(help = remedy, "{path}: {message}")),
     }
 }
 
@@ -38,29 +41,26 @@ pub fn check_packet(file: &Path) -> Result<()> {
     common::writable(file)
 }
 
-/// The last image of the simulator in colour, RGBA, and what is said of it. The packet goes into `file`, where one is given.
+/// The last image of the simulator, which is that of `seconds`, in colour, RGBA, and what is said of it. The packet goes into `file`, where one is given.
 pub fn coloured(
     simulator: &mut Simulator,
-    scene: &Scene,
+    scene: &mut Scene,
     mode: ColourMode,
-    index: u32,
+    (index, seconds): (u32, f64),
     file: Option<&Path>,
 ) -> Result<(Vec<u8>, Value)> {
-    let settings = &scene.doppler;
-    let packet = doppler::packet(&scene.probe, settings);
-    simulator.make_packet(scene, index, &packet).into_diagnostic()?;
+    let settings = mode.doppler(&scene.settings);
+    let made = doppler::make_packet(simulator, scene, seconds, index, mode, &settings);
+    let packet = made.into_diagnostic()?;
     // Before they are filtered.
     let echoes = file.map(|_| simulator.pulses()).transpose().into_diagnostic()?;
     simulator.colour(scene, mode, None).into_diagnostic()?;
     let rgba = simulator.coloured_pixels().into_diagnostic()?.expect("just made");
     let said = json!({
-        "shows": match mode {
-            ColourMode::Color => "velocity",
-            ColourMode::Power => "power",
-        },
+        "shows": mode.word(),
         "prf_hz": settings.prf,
         "pulses": packet.times.len(),
-        "nyquist_mm_per_s": doppler::nyquist(&scene.probe, settings.prf),
+        NYQUIST: doppler::nyquist(&scene.probe, settings.prf),
         "baseline": settings.baseline,
         "inverted": settings.invert,
         "scanlines": [packet.lines.start, packet.lines.end],
@@ -86,7 +86,7 @@ fn write(
     found: &[Correlation],
     said: &Value,
 ) -> std::io::Result<()> {
-    let nyquist = doppler::nyquist(&scene.probe, scene.doppler.prf);
+    let nyquist = said[NYQUIST].as_f64().expect("said above");
     let of = |value: &dyn Fn(&Correlation) -> f64| -> Vec<f32> {
         found.iter().map(|one| value(one) as f32).collect()
     };

@@ -151,14 +151,15 @@ impl Film {
         &mut self,
         index: u32,
         simulator: &mut Simulator,
-        scene: &Scene,
+        scene: &mut Scene,
         coloured_by: Option<(ColourMode, Option<&Path>)>,
     ) -> Result<()> {
         let (width, height, mut rgba) = simulator.pixels().into_diagnostic()?;
         let area = area(simulator);
         let mut said = None;
         if let Some((mode, packet)) = coloured_by {
-            let (coloured, facts) = coloured(simulator, scene, mode, index, packet)?;
+            let at = (index, self.times[index as usize]);
+            let (coloured, facts) = coloured(simulator, scene, mode, at, packet)?;
             (rgba, said) = (coloured, Some(facts));
         }
         if index == 0 {

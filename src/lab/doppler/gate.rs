@@ -53,7 +53,10 @@ pub fn record(
     first: u32,
 ) -> Result<(Vec<Complex<f64>>, u32), SimError> {
     let spectral = scene.spectral.clone();
-    let at_once = (spectral.prf * STILL).round().clamp(1.0, MOST) as usize;
+    let at_once = match spectral.tissue {
+        true => 1,
+        false => (spectral.prf * STILL).round().clamp(1.0, MOST) as usize,
+    };
     // Of a continuous wave the sum, as loud as the gate would be: the phase of an echo is that of its place, whatever the pulse.
     let length = samples(&scene.probe, &spectral).len() as f64;
     let mut echoes = Vec::with_capacity(pulses);

@@ -47,6 +47,8 @@ group! {
         duration: f64 = 3.0, Facts::quantity(&DURATION, 0.05, 60.0).label("Duration").usual(1.0, 10.0);
         /// Velocity at the middle of what is shown, over the Nyquist velocity: the fold is moved by as much.
         baseline: f64 = 0.0, Facts::number(-1.0, 1.0).label("Baseline");
+        /// Whether tissue is heard, too, as it moves from pulse to pulse: tissue Doppler, with `wall_filter = 0`. Each pulse costs more then.
+        tissue: bool = false, Facts::switch().label("Tissue");
         /// True: what flows away from the probe is shown above the baseline.
         invert: bool = false, Facts::switch().label("Invert");
         /// Gain over that of the image: white spectra are so much fainter than what the image shows white.

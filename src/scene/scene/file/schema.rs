@@ -26,7 +26,7 @@ use super::tracker::{MatrixKey, TrackerKeys};
 use super::vary::VaryKeys;
 use crate::settings::{
     Display, Doppler, Form, Fusion, Imaging, Live, Probe, Processing, Simulation, Spectral,
-    Surface, Tissue, group,
+    Surface, Tissue, TissueDoppler, group,
 };
 
 group! {
@@ -177,6 +177,7 @@ tables! {
         defaults::<Placed>("tool_from_probe."), defaults::<MatrixKey>("tool_from_probe.");
     doppler: One<Doppler>, "doppler": defaults::<Doppler>("");
     spectral: One<Spectral>, "spectral": defaults::<Spectral>("");
+    tissue_doppler: One<TissueDoppler>, "tissue_doppler": defaults::<TissueDoppler>("");
     live: One<Live>, "live": defaults::<Live>("");
 }
 

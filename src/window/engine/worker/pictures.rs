@@ -6,14 +6,14 @@ use std::time::Instant;
 
 use super::{Imaged, Taken, Worker, hand_over};
 use crate::engine::News;
-use crate::gpu::{Abandon, FrameTimings, Image};
+use crate::gpu::{Abandon, FrameTimings};
 use crate::live;
 use crate::look::Pictured;
 use crate::model::{Order, Settings};
 use crate::picture::{Coloured, Film, Frame, Pixels, Sector};
 use crate::scene::Scene;
 use crate::settings::Doppler;
-use crate::sim::{ColourMode, Outputs, Shot, SimError, Simulator, Tracer, image_size};
+use crate::sim::{Outputs, Shot, SimError, Simulator, Tracer, image_size};
 use insonify_lab::doppler;
 
 /// Share of the image in the budget while the 3D view is open.
@@ -164,15 +164,19 @@ impl Worker {
         }
         simulator.frames_into(scene, &[Shot::of(scene, index)], &outputs)?;
         let mut timings = simulator.wait()?.pop().unwrap_or_default();
-        let coloured = match order.colour.filter(|_| scene.doppler.fault(&scene.probe).is_none()) {
+        let coloured = match order.colour.filter(|mode| mode.fault(&scene.settings).is_none()) {
             Some(mode) => {
                 let image = self.ring.free(image_size(scene))?;
-                let pulses = live::pulses(scene.doppler.pulses, level);
-                colour(simulator, scene, index, mode, pulses, &image, &mut timings)?;
-                Some(Coloured { image, mode, pulses })
+                let asked = mode.doppler(&scene.settings);
+                let settings = Doppler { pulses: live::pulses(asked.pulses, level), ..asked };
+                let coloured = Coloured { image, mode, pulses: settings.pulses };
+                let at = (index, seconds);
+                colour(simulator, &mut self.scene, at, &settings, &coloured, &mut timings)?;
+                Some(coloured)
             }
             None => None,
         };
+        let scene = &self.scene;
         let wall = began.elapsed();
         if !at_rest {
             self.took = wall;
@@ -230,23 +234,22 @@ impl Worker {
     }
 }
 
-/// Colours the last image by a packet of so many pulses; its times are those of the image, too.
+/// Colours the last image, that of this number and time, by a packet with these settings; its times are those of the image, too.
 fn colour(
     simulator: &mut Simulator,
-    scene: &Scene,
-    index: u32,
-    mode: ColourMode,
-    pulses: u32,
-    image: &Image,
+    scene: &mut Scene,
+    (index, seconds): (u32, f64),
+    settings: &Doppler,
+    to: &Coloured,
     timings: &mut FrameTimings,
 ) -> Result<(), SimError> {
-    let settings = Doppler { pulses, ..scene.doppler.clone() };
-    simulator.make_packet(scene, index, &doppler::packet(&scene.probe, &settings))?;
-    let packet = simulator.wait()?.pop().unwrap_or_default();
-    simulator.colour(scene, mode, Some(image))?;
+    doppler::make_packet(simulator, scene, seconds, index, to.mode, settings)?;
+    let packet = simulator.wait()?;
+    simulator.colour(scene, to.mode, Some(&to.image))?;
     let colours = simulator.wait()?.pop().unwrap_or_default();
-    if !packet.passes.is_empty() {
-        timings.passes.push(("packet".to_owned(), packet.total_ms()));
+    if packet.iter().any(|pulses| !pulses.passes.is_empty()) {
+        let ms = packet.iter().map(FrameTimings::total_ms).sum();
+        timings.passes.push(("packet".to_owned(), ms));
     }
     timings.passes.extend(colours.passes);
     Ok(())

@@ -1,0 +1,40 @@
+//! Modes of `insonify render` besides the image alone.
+
+use insonify::settings::Wave;
+use insonify::sim::ColourMode;
+
+/// Doppler modes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Mode {
+    /// Velocity in colours over the image.
+    Color,
+    /// Power of what moves in colours over the image.
+    Power,
+    /// Velocity of tissue in colours over the image.
+    Tdi,
+    /// Pulsed wave: spectra of a gate against time.
+    Pw,
+    /// Continuous wave: spectra of a whole line against time.
+    Cw,
+}
+
+impl Mode {
+    /// The colours over an image; none of a mode without one.
+    pub fn colours(self) -> Option<ColourMode> {
+        match self {
+            Self::Color => Some(ColourMode::Color),
+            Self::Power => Some(ColourMode::Power),
+            Self::Tdi => Some(ColourMode::Tissue),
+            Self::Pw | Self::Cw => None,
+        }
+    }
+
+    /// How a spectral mode listens; none of one with an image.
+    pub fn wave(self) -> Option<Wave> {
+        match self {
+            Self::Color | Self::Power | Self::Tdi => None,
+            Self::Pw => Some(Wave::Pulsed),
+            Self::Cw => Some(Wave::Continuous),
+        }
+    }
+}
