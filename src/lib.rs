@@ -6,8 +6,8 @@
 pub use insonify_base::{issue, random, statistics};
 pub use insonify_gpu as gpu;
 pub use insonify_lab::{
-    acquire, dataset, doppler, exam, exchange, igtl, import, matching, output, register, study,
-    teach,
+    acquire, dataset, doppler, exam, exchange, igtl, import, matching, output, register, strain,
+    study, teach,
 };
 pub use insonify_scene::{live, probe, scene, settings, volume};
 pub use insonify_sim as sim;

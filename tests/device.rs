@@ -35,6 +35,7 @@ mod shipped;
 mod shots;
 mod skipping;
 mod spectrum;
+mod strain;
 mod tasks;
 mod texture;
 mod view3d;

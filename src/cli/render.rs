@@ -24,6 +24,7 @@ mod labels;
 mod mode;
 mod moments;
 mod spectrum;
+mod strained;
 
 use film::Film;
 use labels::LabelFiles;
@@ -72,13 +73,14 @@ pub struct Render {
     labels: Option<PathBuf>,
     /// Doppler. Colours the image by a packet of pulses in the colour box of the scene's [doppler]: `color` shows velocities, red
     /// towards the probe and blue away from it, `power` how much moves, `tdi` how fast tissue moves (keys:
-    /// [tissue_doppler]). `pw` records the gate of [spectral] instead of an
+    /// [tissue_doppler]), `strain` how it is stretched (red) and compressed (blue) along the scanlines (keys: [strain]). `pw` records the gate of [spectral] instead of an
     /// image, and shows its spectra against time, `cw` all of the gate's line by a continuous wave; NAME.json says what is measured on them. PNG only.
     #[arg(long, value_enum, conflicts_with = "dump")]
     mode: Option<Mode>,
     /// Writes the packet of the last frame of --mode: `iq` (pulse, scanline, sample; real and imaginary), `times` (s), `depth`
     /// (mm), and what was found, `velocity` (mm/s, towards the probe), `variance`, `power` (scanline, sample); packet.json says
-    /// frequency, speed of sound and PRF. Of `pw` and `cw`: `iq` (pulse; real and imaginary), `spectrum` (time, velocity), `velocity`,
+    /// frequency, speed of sound and PRF. Of `strain`: `displacement` (mm), `strain`, `likeness`
+    /// (scanline, sample). Of `pw` and `cw`: `iq` (pulse; real and imaginary), `spectrum` (time, velocity), `velocity`,
     /// `times`, and the traces `maximum` and `mean`. NAME.npz
     #[arg(long, value_name = "FILE", requires = "mode")]
     packet: Option<PathBuf>,

@@ -18,6 +18,7 @@ pub mod import;
 pub mod matching;
 pub mod output;
 pub mod register;
+pub mod strain;
 pub mod study;
 pub mod teach;
 

@@ -15,6 +15,7 @@ mod probe;
 mod processing;
 mod simulation;
 mod spectral;
+mod strain;
 pub mod suggest;
 mod surface;
 mod tissue;
@@ -37,6 +38,7 @@ pub use simulation::{
     Coherence, Loss, Quality, Refraction, Sampling, ScatterMode, Sequence, Simulation, TextureSpace,
 };
 pub use spectral::{Spectral, Wave};
+pub use strain::Strain;
 pub use surface::Surface;
 pub use tissue::Tissue;
 pub use tissue_doppler::TissueDoppler;
@@ -102,9 +104,26 @@ settings! {
     spectral: Spectral;
     /// Tissue Doppler.
     tissue_doppler: TissueDoppler;
+    /// Strain.
+    strain: Strain;
 }
 
 impl Settings {
+    /// Tables of modes besides the image, of which the image itself shows nothing.
+    pub const MODES: [&str; 4] =
+        [Doppler::TABLE, Spectral::TABLE, TissueDoppler::TABLE, Strain::TABLE];
+
+    /// The same with the defaults of [`Self::MODES`]: what the image itself depends on.
+    pub fn of_image(&self) -> Self {
+        Self {
+            doppler: Doppler::default(),
+            spectral: Spectral::default(),
+            tissue_doppler: TissueDoppler::default(),
+            strain: Strain::default(),
+            ..self.clone()
+        }
+    }
+
     /// The value of a key of a table; none where the table is not among these or has no such key.
     pub fn value(&self, table: &str, key: &str) -> Option<Value> {
         struct Find<'s> {

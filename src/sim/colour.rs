@@ -1,9 +1,11 @@
 //! Colours of what flows: correlations of the last packet's pulses, and the finished image with them.
 
+use std::ops::Range;
+
 use super::calibration::Calibration;
 use super::layout::{COLOUR_COLUMNS, COLOUR_ROWS};
 use super::push;
-use super::stages::colour::{COLOURED, Work};
+use super::stages::colour::{COLOUR, COLOURED, Work};
 use super::{Correlation, Packet, SimError, Simulator};
 use crate::gpu::Image;
 use crate::scene::Scene;
@@ -110,8 +112,8 @@ pub fn polynomials(count: usize, order: u32) -> Vec<f32> {
 }
 
 /// The work that the stages do on a packet of the colour box, as the settings of a scene and the mode say.
-fn work(scene: &Scene, mode: ColourMode, packet: &Packet) -> Work {
-    let (doppler, calibration) = (&mode.doppler(&scene.settings), Calibration::new(scene));
+fn work(scene: &Scene, doppler: &Doppler, mode: ColourMode, packet: &Packet) -> Work {
+    let calibration = Calibration::new(scene);
     let count = packet.times.len();
     let polynomials = doppler.order().map_or_else(Vec::new, |order| polynomials(count, order));
     let [count, lines, samples] =
@@ -157,16 +159,57 @@ impl Simulator {
         mode: ColourMode,
         shown: Option<&Image>,
     ) -> Result<(), SimError> {
+        let held = self.passes.lanes[0].packets.holds.take();
+        let packet = held.expect("a packet was made");
+        let work = work(scene, &mode.doppler(&scene.settings), mode, &packet);
+        self.coloured(&packet, &work, None, shown)
+    }
+
+    /// Colours the last image by values that were found otherwise, at each sample of these scanlines, in the colours that velocities
+    /// have: -1 is the fastest away from the probe, 1 the fastest towards it; what has none stays grey. `doppler` has the other
+    /// settings.
+    ///
+    /// # Errors
+    /// A Vulkan error; device out of memory.
+    pub fn colour_by(
+        &mut self,
+        scene: &Scene,
+        doppler: &Doppler,
+        (lines, samples): (Range<u32>, Range<u32>),
+        values: &[Option<f64>],
+        shown: Option<&Image>,
+    ) -> Result<(), SimError> {
+        let times = vec![0.0; 2];
+        let packet = Packet { times, lines, samples, renewed: false };
+        let of = |value: &Option<f64>| value.map_or_else(Correlation::default, Correlation::loud);
+        let found: Vec<Correlation> = values.iter().map(of).collect();
+        let work = work(scene, doppler, ColourMode::Color, &packet);
+        self.coloured(&packet, &work, Some(&found), shown)
+    }
+
+    /// Colours the last image by the pulses on the device, or by correlations that are given.
+    fn coloured(
+        &mut self,
+        packet: &Packet,
+        work: &Work,
+        found: Option<&[Correlation]>,
+        shown: Option<&Image>,
+    ) -> Result<(), SimError> {
         let lane = &mut self.passes.lanes[0];
-        let packet = lane.packets.holds.take().expect("a packet was made");
         let mut cmd = self.submissions.begin()?;
         // So that the picture is replaced as a whole.
         cmd.keep_on();
         lane.packets.correlate(cmd.device(), packet.lines.len() * packet.samples.len())?;
         // The packet has left its own.
         lane.set(&mut cmd, self.passes.shown, &self.tables)?;
-        let work = work(scene, mode, &packet);
-        let coloured = self.passes.colour(&mut cmd, &work, self.last.fused)?;
+        let first = match (found, &lane.packets.correlations) {
+            (Some(found), Some(buffer)) => {
+                cmd.write(buffer, 0, bytemuck::cast_slice(found))?;
+                COLOUR.len() - 1
+            }
+            _ => 0,
+        };
+        let coloured = self.passes.colour(&mut cmd, work, first, self.last.fused)?;
         if let Some(image) = shown {
             cmd.copy_to_image(coloured, image)?;
         }

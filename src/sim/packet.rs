@@ -43,6 +43,13 @@ pub struct Correlation {
 }
 
 impl Correlation {
+    /// That of an echo which stands out of all else, whose velocity is this share of Nyquist's.
+    pub(super) fn loud(share: f64) -> Self {
+        let (im, re) = (PI * share).sin_cos();
+        let power = 1e6;
+        Self { next: [re, im].map(|part| (part * power) as f32), power: power as f32 }
+    }
+
     /// Velocity towards the probe, in the unit of `nyquist`, the velocity that turns an echo by half a turn from pulse to
     /// pulse; 0 where there is no echo. After Kasai et al. 1985, IEEE Trans. Sonics Ultrason. 32, 458-464.
     pub fn velocity(&self, nyquist: f64) -> f64 {

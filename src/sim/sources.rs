@@ -1,7 +1,7 @@
 //! The settings of which the tables on the device are made, and tables of settings used before.
 
 use crate::scene::{Scene, Surface, Tissue, Wire};
-use crate::settings::{Doppler, Settings, Spectral, TissueDoppler};
+use crate::settings::Settings;
 use crate::tables::Tables;
 
 /// Tables of settings used before, kept because settings come back: live quality changes between levels.
@@ -39,12 +39,9 @@ pub struct Sources {
 impl Sources {
     /// Those of a scene.
     pub fn of(scene: &Scene) -> Self {
-        let mut settings = scene.settings.clone();
         // What is no part of the tables.
+        let mut settings = scene.settings.of_image();
         settings.simulation.seed = 0;
-        settings.doppler = Doppler::default();
-        settings.spectral = Spectral::default();
-        settings.tissue_doppler = TissueDoppler::default();
         Self {
             settings,
             tissues: scene.tissues.clone(),

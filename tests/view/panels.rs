@@ -155,6 +155,7 @@ fn each_section_sets_what_is_saved_and_undo_takes_it_back() {
         "Doppler",
         "Spectral",
         "Tissue_doppler",
+        "Strain",
         "Fusion",
         "Registration",
         "Tissues",

@@ -5,6 +5,7 @@ use std::path::Path;
 use miette::{IntoDiagnostic, Result, miette};
 use serde_json::{Value, json};
 
+use super::mode::Colours;
 use crate::cli::common;
 use insonify::doppler;
 use insonify::output::npy::Element;
@@ -19,8 +20,15 @@ const NYQUIST: &str = "nyquist_mm_per_s";
 ///
 /// # Errors
 /// The fault with its remedy, if these settings cannot colour an image of this probe.
-pub fn check(scene: &Scene, mode: ColourMode) -> Result<()> {
-    match mode.fault(&scene.settings) {
+pub fn check(scene: &Scene, colours: Colours) -> Result<()> {
+    let fault = match colours {
+        Colours::Doppler(mode) => mode.fault(&scene.settings),
+        Colours::Strain => {
+            let fault = scene.doppler.fault_of_box();
+            fault.map(|(key, message, remedy)| (format!("doppler.{key}"), message, remedy))
+        }
+    };
+    match fault {
         None => Ok(()),
         Some((path, message, remedy)) => Err(miette!(help = remedy, "{path}: {message}")),
     }

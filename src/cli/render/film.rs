@@ -7,7 +7,9 @@ use miette::{IntoDiagnostic, Result, miette};
 use serde_json::{Map, Value, json};
 
 use super::coloured::coloured;
+use super::mode::Colours;
 use super::moments::Moment;
+use super::strained::strained;
 use crate::cli::common;
 use crate::cli::images::Images;
 use insonify::acquire::Recording;
@@ -18,8 +20,8 @@ use insonify::output::mp4::Mp4;
 use insonify::output::picture::{colour_png, grey_png};
 use insonify::output::{files, film};
 use insonify::scene::Scene;
+use insonify::sim::Simulator;
 use insonify::sim::facts::{self, Area};
-use insonify::sim::{ColourMode, Simulator};
 
 /// Name of the transform from the probe to the patient's RAS.
 const POSE: &str = "ProbeToReference";
@@ -152,14 +154,17 @@ impl Film {
         index: u32,
         simulator: &mut Simulator,
         scene: &mut Scene,
-        coloured_by: Option<(ColourMode, Option<&Path>)>,
+        coloured_by: Option<(Colours, Option<&Path>)>,
     ) -> Result<()> {
         let (width, height, mut rgba) = simulator.pixels().into_diagnostic()?;
         let area = area(simulator);
         let mut said = None;
-        if let Some((mode, packet)) = coloured_by {
+        if let Some((colours, packet)) = coloured_by {
             let at = (index, self.times[index as usize]);
-            let (coloured, facts) = coloured(simulator, scene, mode, at, packet)?;
+            let (coloured, facts) = match colours {
+                Colours::Doppler(mode) => coloured(simulator, scene, mode, at, packet)?,
+                Colours::Strain => strained(simulator, scene, at, packet)?,
+            };
             (rgba, said) = (coloured, Some(facts));
         }
         if index == 0 {

@@ -3,7 +3,7 @@
 //! parameters and does not list them; [`SUGGESTED`] are ours.
 
 use crate::settings::units::ANGLE;
-use crate::settings::{Doppler, Facts, Form, Group, Member, Settings, Spectral, Value, Visitor};
+use crate::settings::{Facts, Form, Group, Member, Settings, Value, Visitor};
 
 /// Distance from the scene's own value, below and above.
 #[derive(Clone, Copy, Debug)]
@@ -68,7 +68,7 @@ impl Parameter {
         impl Visitor for All {
             fn visit<T: Group>(&mut self, _: Member<T>) {
                 // A contact sheet has neither colours nor spectra.
-                if T::TABLE != Doppler::TABLE && T::TABLE != Spectral::TABLE {
+                if !Settings::MODES.contains(&T::TABLE) {
                     self.0.extend(numbers::<T>());
                 }
             }

@@ -84,6 +84,11 @@ impl Doppler {
 
     /// What is wrong with these settings for a probe: the key at fault, the cause, and the remedy. None where they fit.
     pub fn fault(&self, probe: &Probe) -> Option<(&'static str, String, String)> {
+        self.fault_of_box().or_else(|| self.fault_of_pulses(probe))
+    }
+
+    /// What is wrong with the colour box.
+    pub fn fault_of_box(&self) -> Option<(&'static str, String, String)> {
         for (low, high, key) in
             [(self.left, self.right, "right"), (self.top, self.bottom, "bottom")]
         {
@@ -93,6 +98,11 @@ impl Doppler {
                 return Some((key, message, remedy.to_owned()));
             }
         }
+        None
+    }
+
+    /// What is wrong with the packets of pulses.
+    fn fault_of_pulses(&self, probe: &Probe) -> Option<(&'static str, String, String)> {
         // Echoes of one pulse have to come back before the next is sent.
         let deepest = self.bottom * probe.depth;
         let most = probe.speed * 1e6 / (2.0 * deepest);

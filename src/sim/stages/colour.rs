@@ -61,12 +61,13 @@ pub(crate) struct Work {
 }
 
 impl Passes {
-    /// Records the stages for the first lane's packet and its finished image, which they leave as it is. Returns the coloured
+    /// Records the stages from `first` on for the first lane's packet and its finished image, which they leave as it is. Returns the coloured
     /// one, ready to be copied.
     pub(crate) fn colour(
         &mut self,
         cmd: &mut Commands<'_>,
         work: &Work,
+        first: usize,
         fused: bool,
     ) -> Result<&Buffer, GpuError> {
         let buffers = &mut self.lanes[0].buffers;
@@ -84,7 +85,7 @@ impl Passes {
             bytemuck::bytes_of(&gate),
             bytemuck::bytes_of(&work.colour),
         ];
-        for (pass, push) in COLOUR.iter().zip(pushes).skip(usize::from(taken == 0)) {
+        for (pass, push) in COLOUR.iter().zip(pushes).skip(first.max(usize::from(taken == 0))) {
             cmd.scope(pass.name);
             let of_box = Extent::Threads([samples, lines, 1]);
             let extent = pass.extent.map_or(of_box, |extent| extent(self.frame()));

@@ -25,7 +25,7 @@ use super::tissues::TissueKeys;
 use super::tracker::{MatrixKey, TrackerKeys};
 use super::vary::VaryKeys;
 use crate::settings::{
-    Display, Doppler, Form, Fusion, Imaging, Live, Probe, Processing, Simulation, Spectral,
+    Display, Doppler, Form, Fusion, Imaging, Live, Probe, Processing, Simulation, Spectral, Strain,
     Surface, Tissue, TissueDoppler, group,
 };
 
@@ -178,6 +178,7 @@ tables! {
     doppler: One<Doppler>, "doppler": defaults::<Doppler>("");
     spectral: One<Spectral>, "spectral": defaults::<Spectral>("");
     tissue_doppler: One<TissueDoppler>, "tissue_doppler": defaults::<TissueDoppler>("");
+    strain: One<Strain>, "strain": defaults::<Strain>("");
     live: One<Live>, "live": defaults::<Live>("");
 }
 
