@@ -3,6 +3,7 @@
 
 pub mod files;
 pub mod indexed;
+pub mod lock;
 pub mod npy;
 pub mod npz;
 pub mod picture;

@@ -16,6 +16,7 @@ mod archive;
 mod distribution;
 mod draws;
 mod exchange;
+mod hold;
 pub mod layouts;
 mod links;
 mod members;

@@ -1,9 +1,12 @@
 //! Runs that are stopped: killed, or without room.
 
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+use insonify::output::lock::{Hold, LOCK};
+
+use crate::common::program;
 use crate::common::skip::{Lacking, skip};
 use crate::dataset::{Desk, PLAN, files};
 
@@ -20,25 +23,63 @@ fn count(folder: &Path, ending: &str) -> usize {
     all.map(of).sum()
 }
 
-#[test]
-fn a_killed_run_is_gone_on_with_to_the_same_bytes() {
-    let desk = Desk::new();
-    let folder = desk.path("killed");
-    let mut run = Command::new(env!("CARGO_BIN_EXE_insonify"))
+/// A run in the folder of this name, which has just come to the middle of the third part.
+fn at_work(desk: &Desk, name: &str) -> Child {
+    let run = Command::new(env!("CARGO_BIN_EXE_insonify"))
         .current_dir(desk.path(""))
-        .args(["dataset", "plan.toml", "--tracer", "bvh", "-o", "killed"])
+        .args(["dataset", "plan.toml", "--tracer", "bvh", "-o", name])
         .stdout(Stdio::null())
         .stderr(Stdio::null())
         .spawn()
         .expect("the program starts");
     let begun = Instant::now();
-    // In the middle of the third part.
-    while count(&folder, ".json") < 1 + 5 {
+    while count(&desk.path(name), ".json") < 1 + 5 {
         assert!(begun.elapsed() < Duration::from_secs(240), "no sample comes");
         std::thread::sleep(Duration::from_millis(1));
     }
+    run
+}
+
+#[test]
+fn a_folder_in_which_another_run_is_at_work_is_left_to_it() {
+    let desk = Desk::new();
+    let mut run = at_work(&desk, "both");
+    let refused = |more: &[&str]| {
+        let (went_well, said) = desk.make(&[&["-o", "both"], more].concat());
+        assert!(!went_well, "{said}");
+        let parts =
+            ["both", "another run makes samples of this shard here: shard 0/1", "wait for its end"];
+        for part in parts {
+            assert!(said.contains(part), "{part}: {said}");
+        }
+    };
+    refused(&["--resume"]);
+    assert!(run.wait().expect("it ends").success());
+    assert!(files(&desk.path("both")) == files(&crate::dataset::desk().path("whole")));
+    // As long as it lives, whatever a second one asks for.
+    let held = Hold::take(&desk.path("both/.shard-0-of-1.lock")).expect("room").expect("nobody's");
+    refused(&[]);
+    refused(&["--shard", "3/10", "--resume"]);
+    drop(held);
+    desk.made(&["-o", "both", "--shard", "3/10", "--resume"]);
+    // Nor do two write one layout.
+    std::fs::create_dir(desk.path("laid")).expect("made");
+    let held = Hold::take(&desk.path("laid").join(LOCK)).expect("room").expect("nobody's");
+    let layout = ["dataset", "both", "--layout", "coco", "-o", "laid"];
+    let (went_well, said) = program::insonify(&desk.path(""), &layout);
+    assert!(!went_well && said.contains("laid") && said.contains("another run"), "{said}");
+    drop(held);
+    assert!(program::insonify(&desk.path(""), &layout).0);
+}
+
+#[test]
+fn a_killed_run_is_gone_on_with_to_the_same_bytes() {
+    let desk = Desk::new();
+    let folder = desk.path("killed");
+    let mut run = at_work(&desk, "killed");
     run.kill().expect("it runs");
     run.wait().expect("it ends");
+    assert!(folder.join(".shard-0-of-1.lock").exists(), "what it leaves keeps nobody out");
     let left = count(&folder, ".tar");
     assert!((1..10).contains(&left), "{left} archives were left");
     assert!(!folder.join("sheet.png").exists());

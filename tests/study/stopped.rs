@@ -32,6 +32,8 @@ fn a_killed_run_is_gone_on_with() {
         assert!(begun.elapsed() < Duration::from_secs(240), "no image comes");
         std::thread::sleep(Duration::from_millis(1));
     }
+    let (went_well, said) = desk.make(&["-o", "killed", "--resume"]);
+    assert!(!went_well && said.contains("killed is being written by another run"), "{said}");
     run.kill().expect("it runs");
     run.wait().expect("it ends");
     let left = images_in(&folder);

@@ -4,11 +4,14 @@ use std::fs::File;
 use std::io::{Error, ErrorKind, Result, Write};
 use std::path::{Path, PathBuf};
 
-/// Most drafts of one file at a time: of processes of the same number, on machines that share a folder.
+use super::lock;
+
+/// Most drafts of one file at a time.
 const DRAFTS: u32 = 100;
 
 /// A file that is being written beside its place, as `.NAME.` with a number, and takes its place when it is
-/// finished: no failure leaves half a file. Dropped before, it is removed. Pipes and devices are written to as they are.
+/// finished: no failure leaves half a file. Dropped before, it is removed; what a killed process has left of it is removed by
+/// the next draft of the file. Pipes and devices are written to as they are.
 pub struct Draft {
     path: PathBuf,
     /// Path of what is being written; `path` itself for a stream.
@@ -29,13 +32,10 @@ impl Draft {
         }
         let path = path.canonicalize().unwrap_or_else(|_| path.to_owned());
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        let mine = std::process::id();
-        let free = (mine..mine.saturating_add(DRAFTS)).find_map(|number| {
+        // From 1, so that the dead ones are met.
+        let free = (1..=DRAFTS).find_map(|number| {
             let beside = path.with_file_name(format!(".{name}.{number}"));
-            match File::create_new(&beside) {
-                Err(e) if e.kind() == ErrorKind::AlreadyExists => None,
-                made => Some(made.map(|file| (beside, file))),
-            }
+            lock::made(&beside).map(|file| Some((beside, file?))).transpose()
         });
         let all_taken = || Err(Error::from(ErrorKind::AlreadyExists));
         let (beside, file) = free.unwrap_or_else(all_taken)?;
@@ -44,6 +44,11 @@ impl Draft {
             draft.open().set_permissions(before.permissions())?;
         }
         Ok(draft)
+    }
+
+    /// Path of what is being written, for a program that writes it in this one's place.
+    pub fn beside(&self) -> &Path {
+        &self.beside
     }
 
     fn open(&self) -> &File {
@@ -135,6 +140,26 @@ mod tests {
             (names(), std::fs::read(&path).unwrap()),
             (vec!["a.tar".to_owned()], b"after".to_vec())
         );
+    }
+
+    #[test]
+    fn what_a_killed_process_left_goes_with_the_next_draft() {
+        let folder = tempfile::tempdir().unwrap();
+        let [path, left] = ["a.gif", ".a.gif.1"].map(|name| folder.path().join(name));
+        std::fs::write(&left, "half").unwrap();
+        // Another file's, and a folder, are not ours.
+        let others = [".b.gif.1", ".a.gif.2"].map(|name| folder.path().join(name));
+        std::fs::write(&others[0], "half").unwrap();
+        std::fs::create_dir(&others[1]).unwrap();
+        let mut first = Draft::new(&path).unwrap();
+        let second = Draft::new(&path).unwrap();
+        assert_eq!((first.beside(), second.beside()), (&*left, &*folder.path().join(".a.gif.3")));
+        first.write_all(b"whole").unwrap();
+        first.finish().unwrap();
+        drop(second);
+        assert_eq!(std::fs::read(&path).unwrap(), b"whole");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 3);
+        assert!(others.iter().all(|path| path.exists()));
     }
 
     #[test]

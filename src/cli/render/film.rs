@@ -16,6 +16,7 @@ use insonify::acquire::Recording;
 use insonify::exchange::{self, Format, Frames};
 use insonify::output;
 use insonify::output::dicom::About;
+use insonify::output::lock::Hold;
 use insonify::output::mp4::Mp4;
 use insonify::output::picture::{colour_png, grey_png};
 use insonify::output::{files, film};
@@ -39,6 +40,8 @@ pub struct Film {
     sidecar: Map<String, Value>,
     /// What is said of each frame: file, time, pose.
     frames: Vec<Value>,
+    /// No other run writes pictures of these names meanwhile.
+    _held: Option<Hold>,
 }
 
 enum Reel {
@@ -108,7 +111,7 @@ impl Film {
     /// Begins the output of frames at these moments, `shown` of them a second.
     ///
     /// # Errors
-    /// A file that cannot be made; frames that do not fit into it.
+    /// A file that cannot be made; numbered pictures that another run is writing; frames that do not fit into it.
     pub fn new(
         output: &Path,
         simulator: &Simulator,
@@ -133,6 +136,10 @@ impl Film {
         } else {
             Reel::Images(Images::new(output, moments.len() as u32))
         };
+        let held = match &reel {
+            Reel::Images(images) if moments.len() > 1 => Some(held(images)?),
+            _ => None,
+        };
         // Where time stands still it goes on as the loop is shown: frames are told apart by their times.
         let goes_on = moments.windows(2).all(|pair| pair[0].seconds < pair[1].seconds);
         let times = (0u32..).zip(moments).map(|(index, moment)| match goes_on {
@@ -141,7 +148,7 @@ impl Film {
         });
         let ras_from_world = scene.tracker.axes.to_ras();
         let times = times.collect();
-        Ok(Self { shown, times, ras_from_world, reel, sidecar, frames: Vec::new() })
+        Ok(Self { shown, times, ras_from_world, reel, sidecar, frames: Vec::new(), _held: held })
     }
 
     /// Adds the last frame of the simulator, the one of this number, coloured by a packet of its own if a mode is given; the packet is
@@ -257,6 +264,20 @@ impl Film {
         }
         Ok(self.sidecar)
     }
+}
+
+/// The right to write these pictures, one after the other.
+fn held(images: &Images) -> Result<Hold> {
+    let first = images.path(0);
+    let path =
+        first.with_file_name(format!(".{}.lock", first.file_name().unwrap_or_default().display()));
+    let taken = Hold::take(&path).map_err(|e| miette!("writing {}: {e}", path.display()))?;
+    taken.ok_or_else(|| {
+        miette!(
+            help = "wait for its end or stop it, or name other pictures by -o",
+            "{images}: another run is writing pictures of these names"
+        )
+    })
 }
 
 /// The last part of a path.

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use insonify::output::lock::{Hold, LOCK};
 use insonify::output::{self, files};
 use insonify::scene::file::Plan;
 use insonify::study::key::crc32;
@@ -56,13 +57,23 @@ impl Folder {
     }
 
     /// Makes the folder and notes `settings` in it; or, to resume, compares them with those of its beginning and
-    /// removes unfinished files of a killed run.
-    pub fn begin(&self, settings: &Value, resume: bool) -> Result<()> {
+    /// removes unfinished files of a killed run. No other run writes there while the result lives.
+    pub fn begin(&self, settings: &Value, resume: bool) -> Result<Hold> {
         let root = self.root.display();
         let fail = |cause: String, remedy: &str| Err(miette!(help = remedy, "{cause}"));
+        std::fs::create_dir_all(&self.root)
+            .into_diagnostic()
+            .wrap_err_with(|| format!("making the folder {root}"))?;
+        let taken = Hold::take(&self.root.join(LOCK)).into_diagnostic();
+        let Some(held) = taken.wrap_err_with(|| format!("writing {root}"))? else {
+            return fail(
+                format!("{root} is being written by another run"),
+                "wait for its end or stop it, and add --resume; or name a new folder",
+            );
+        };
         let before = std::fs::read_to_string(self.settings()).ok();
         // A run that was killed at once leaves half-written settings.
-        let is_ours = |name: &str| name.starts_with(".settings.json.");
+        let is_ours = |name: &str| name == LOCK || files::draft_of(name) == Some("settings.json");
         let is_empty = std::fs::read_dir(&self.root).map_or(true, |all| {
             let mut names = all.flatten().map(|entry| entry.file_name());
             names.all(|name| is_ours(&name.to_string_lossy()))
@@ -98,7 +109,8 @@ impl Folder {
         }
         self.remove_unfinished().into_diagnostic().wrap_err_with(|| format!("tidying {root}"))?;
         let text = output::json(settings);
-        self.write(&self.settings(), text.as_bytes())
+        self.write(&self.settings(), text.as_bytes())?;
+        Ok(held)
     }
 
     /// Writes a file of the study as a whole or not at all, and makes its folder where there is none.

@@ -52,7 +52,7 @@ pub fn run(args: &Make) -> Result<()> {
     let cases = cases(&plan, &loaded, seed);
     let most = cases.iter().map(|c| c.images.len()).max().unwrap_or(0);
     let folder = Folder::new(&args.output, cases.len(), most);
-    folder.begin(&settings(&plan, common, seed, device.name())?, args.resume)?;
+    let _held = folder.begin(&settings(&plan, common, seed, device.name())?, args.resume)?;
     let mut maker = Maker {
         plan: &plan,
         loaded: &loaded,

@@ -6,6 +6,7 @@ use miette::{Context, IntoDiagnostic, Result};
 use serde::Serialize;
 
 use super::pictures::Picture;
+use insonify::output::files::Draft;
 
 /// One row. Columns are named as the fields.
 #[derive(Debug, Serialize)]
@@ -72,11 +73,12 @@ impl Record {
 /// Writes the table as CSV with a header.
 pub fn write(path: &Path, records: &[Record]) -> Result<()> {
     let whole = || -> Result<(), csv::Error> {
-        let mut writer = csv::Writer::from_path(path)?;
+        let mut writer = csv::Writer::from_writer(Draft::new(path)?);
         for record in records {
             writer.serialize(record)?;
         }
-        Ok(writer.flush()?)
+        let draft = writer.into_inner().map_err(|e| e.into_error())?;
+        Ok(draft.finish()?)
     };
     whole().into_diagnostic().wrap_err_with(|| format!("writing {}", path.display()))
 }

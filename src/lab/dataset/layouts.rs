@@ -14,6 +14,7 @@ use serde_json::Value;
 
 use super::DatasetError;
 use crate::issue::FileError;
+use crate::output::lock::{Hold, LOCK};
 use crate::output::{self, files};
 pub use card::Licence;
 use card::Totals;
@@ -54,16 +55,27 @@ const PER_FOLDER: u64 = 1000;
 /// The files of a layout that is being written.
 struct Out {
     root: PathBuf,
+    _held: Hold,
 }
 
 impl Out {
     /// Begins a folder, which has to be new or empty.
     fn new(root: &Path) -> Result<Self, DatasetError> {
-        if fs::read_dir(root).is_ok_and(|mut entries| entries.next().is_some()) {
-            let message = "holds files already".to_owned();
-            return Err(FileError::file(root, message, "name a new folder").into());
+        let refused =
+            |message: &str, remedy| Err(FileError::file(root, message.to_owned(), remedy).into());
+        fs::create_dir_all(root).map_err(|e| DatasetError::writing(root, e))?;
+        let path = root.join(LOCK);
+        let Some(held) = Hold::take(&path).map_err(|e| DatasetError::writing(&path, e))? else {
+            return refused(
+                "is being written by another run",
+                "wait for its end, or name a new folder",
+            );
+        };
+        let mut entries = fs::read_dir(root).map_err(|e| DatasetError::reading(root, e))?.flatten();
+        if entries.any(|entry| entry.file_name() != LOCK) {
+            return refused("holds files already", "name a new folder");
         }
-        Ok(Self { root: root.to_owned() })
+        Ok(Self { root: root.to_owned(), _held: held })
     }
 
     /// Writes a file, by its path in the folder.
@@ -103,13 +115,16 @@ pub fn write(
         totals.add(sample);
         progress(totals.samples(), set.samples);
     };
+    if layout == Layout::Table {
+        return table::write(&set, to, &mut counted);
+    }
+    let out = Out::new(to)?;
     match layout {
-        Layout::Table => return table::write(&set, to, &mut counted),
-        Layout::NnUnet => nnunet::write(&set, &Out::new(to)?, &mut counted)?,
-        Layout::Coco => coco::write(&set, licence, &Out::new(to)?, &mut counted)?,
-        Layout::HuggingFace => huggingface::write(&set, &Out::new(to)?, &mut counted)?,
+        Layout::NnUnet => nnunet::write(&set, &out, &mut counted)?,
+        Layout::Coco => coco::write(&set, licence, &out, &mut counted)?,
+        Layout::HuggingFace => huggingface::write(&set, &out, &mut counted)?,
+        Layout::Table => unreachable!("it has no folder"),
     }
     let card = totals.card(&set, layout, licence);
-    files::replace(&to.join("README.md"), card.as_bytes())
-        .map_err(|e| DatasetError::writing(&to.join("README.md"), e))
+    out.write("README.md", card.as_bytes())
 }

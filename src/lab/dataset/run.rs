@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use serde_json::json;
 
-use super::{DatasetError, Event, Gallery, Part, Plan, Store, Studio};
+use super::{DatasetError, Event, Gallery, Part, Plan, Store, Studio, hold};
 use crate::gpu::Device;
 use crate::sim::Tracer;
 
@@ -60,7 +60,8 @@ impl Run<'_> {
     /// `wanted` is the tracer, none the device's best. Returns the sheet.
     ///
     /// # Errors
-    /// The cause that keeps a sample from being made or written; what was finished before stays.
+    /// Another run that makes samples of this shard in the folder; the cause that keeps a sample from being made or written;
+    /// what was finished before stays.
     pub fn make(
         &self,
         device: &Arc<Device>,
@@ -70,6 +71,7 @@ impl Run<'_> {
         let parts = self.parts();
         let store = Store::new(self.plan, self.root);
         let tracer = wanted.map(|tracer| tracer.to_string());
+        let _held = hold::take(self.root, self.shard, self.plan.parts().len())?;
         let about = json!({ "name": device.name(), "driver": device.driver(), "tracer": tracer });
         store.begin(&parts, &about, self.resume)?;
         let mut studio = Studio::new(self.plan, device, wanted);

@@ -10,10 +10,10 @@ use serde_json::{Map, Value, json};
 
 use super::DatasetError;
 use super::archive::{self, Archive};
-use super::exchange;
 use super::members::{IMAGE, SEGMENTATION, extensions, members};
 use super::plan::{Format, Part, Plan};
 use super::studio::{Made, Studio};
+use super::{exchange, hold};
 use crate::issue::FileError;
 use crate::output::{self, files};
 
@@ -189,6 +189,7 @@ impl<'p> Store<'p> {
             |path: &Path| std::fs::read(path).is_ok_and(|t| t == self.plan.text().as_bytes());
         let ours = |entry: &std::fs::DirEntry| match entry.file_name().to_string_lossy() {
             name if name == PLAN => this(&entry.path()),
+            name if hold::shard(&name).is_some() => true,
             name => files::draft_of(&name).is_some_and(|of| [PLAN, MANIFEST].contains(&of)),
         };
         std::fs::read_dir(&self.root).map_or(true, |all| all.flatten().all(|entry| ours(&entry)))

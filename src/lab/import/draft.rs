@@ -7,6 +7,7 @@ use glam::DVec3;
 use super::pose::View;
 use super::table::UNKNOWN;
 use crate::issue::FileError;
+use crate::output::lock::{Hold, LOCK};
 use crate::output::{files, naming, obj};
 use crate::scene::check::SENSIBLE_SIZE;
 use crate::scene::mesh::Soup;
@@ -44,7 +45,7 @@ pub struct Part {
 }
 
 /// A scene in the making.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Draft {
     /// Folder to be written.
     pub folder: PathBuf,
@@ -62,20 +63,18 @@ pub struct Draft {
     pub skin: Option<String>,
     /// Place of the probe, and the name of the organ that it looks at.
     pub view: Option<(View, String)>,
+    /// No other import writes the folder meanwhile.
+    _held: Hold,
 }
 
 impl Draft {
     /// Makes the folder of the scene.
     ///
     /// # Errors
-    /// There is a scene in it already, unless `force`; its meshes would be written over what is read; it cannot be made.
+    /// There is a scene in it already, unless `force`, or another import writes one; its meshes would be written over what is
+    /// read; it cannot be made.
     pub fn begin(folder: &Path, source: &Path, force: bool) -> Result<Self, FileError> {
         let scene = folder.join(SCENE);
-        if scene.exists() && !force {
-            let message = "is there already";
-            let remedy = "name another folder, or give --force to replace it";
-            return Err(FileError::file(&scene, message, remedy));
-        }
         let meshes = folder.join(MESHES);
         let real = |path: &Path| path.canonicalize().ok();
         if real(&meshes)
@@ -85,6 +84,20 @@ impl Draft {
             let message =
                 "is where what is read lies, and the scene's meshes would be written over it";
             return Err(FileError::file(&meshes, message, "name another folder by -o"));
+        }
+        std::fs::create_dir_all(folder).map_err(|e| unwritten(folder, &e))?;
+        let Some(held) = Hold::take(&folder.join(LOCK)).map_err(|e| unwritten(folder, &e))? else {
+            let message = "is being written by another import";
+            return Err(FileError::file(
+                folder,
+                message,
+                "wait for its end, or name another folder",
+            ));
+        };
+        if scene.exists() && !force {
+            let message = "is there already";
+            let remedy = "name another folder, or give --force to replace it";
+            return Err(FileError::file(&scene, message, remedy));
         }
         std::fs::create_dir_all(&meshes).map_err(|e| unwritten(folder, &e))?;
         Ok(Self {
@@ -96,6 +109,7 @@ impl Draft {
             remarks: Vec::new(),
             skin: None,
             view: None,
+            _held: held,
         })
     }
 

@@ -10,6 +10,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::thread::JoinHandle;
 
+use crate::output::files::Draft;
+
 /// The program, on the PATH.
 const PROGRAM: &str = "ffmpeg";
 /// Most frames per second: what screens show.
@@ -158,6 +160,10 @@ fn even_rgb([width, height]: [u32; 2], rgba: &[u8]) -> Vec<u8> {
     out
 }
 
+fn unwritten(path: &Path, cause: std::io::Error) -> Mp4Error {
+    Mp4Error::File { path: path.to_owned(), cause: cause.to_string() }
+}
+
 fn unstarted(error: std::io::Error) -> Mp4Error {
     match error.kind() {
         ErrorKind::NotFound => Mp4Error::Missing,
@@ -170,16 +176,16 @@ struct Encoder {
     child: Child,
     /// Reads what it says, so that it never waits for a reader.
     messages: Option<JoinHandle<String>>,
-    beside: PathBuf,
+    /// None once the film is in its place.
+    draft: Option<Draft>,
 }
 
 impl Encoder {
     fn new(program: &OsStr, path: &Path, size: [u32; 2], rate: f64) -> Result<Self, Mp4Error> {
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        let beside = path.with_file_name(format!(".{name}.{}", std::process::id()));
+        let draft = Draft::new(path).map_err(|cause| unwritten(path, cause))?;
         let mut child = Command::new(program)
             .args(arguments(size, rate))
-            .arg(named(&beside))
+            .arg(named(draft.beside()))
             .stdin(Stdio::piped())
             .stdout(Stdio::null())
             .stderr(Stdio::piped())
@@ -192,15 +198,15 @@ impl Encoder {
             let _ = output.read_to_end(&mut text);
             String::from_utf8_lossy(&text).into_owned()
         });
-        Ok(Self { child, messages: Some(messages), beside })
+        Ok(Self { child, messages: Some(messages), draft: Some(draft) })
     }
 
     fn finish(mut self, path: &Path) -> Result<(), Mp4Error> {
         drop(self.child.stdin.take());
         match self.child.wait() {
             Ok(status) if status.success() => {
-                let moved = std::fs::rename(&self.beside, path);
-                moved.map_err(|e| Mp4Error::File { path: path.to_owned(), cause: e.to_string() })
+                let draft = self.draft.take().expect("it is finished only once");
+                draft.finish().map_err(|cause| unwritten(path, cause))
             }
             _ => Err(self.ended(path)),
         }
@@ -222,10 +228,9 @@ impl Encoder {
 
 impl Drop for Encoder {
     fn drop(&mut self) {
-        // It may have ended by itself, and then there may be no file.
+        // It may have ended by itself. Only then the draft is removed.
         let _ = self.child.kill();
         let _ = self.child.wait();
-        let _ = std::fs::remove_file(&self.beside);
     }
 }
 
