@@ -18,6 +18,7 @@ mod dataset;
 mod defects;
 mod doppler;
 mod drivers;
+mod homeless;
 mod igtl;
 mod import;
 mod inputs;

@@ -9,10 +9,12 @@ pub mod npz;
 pub mod picture;
 pub mod sheet;
 
+use std::collections::BTreeSet;
 use std::fmt::Display;
 use std::io::{ErrorKind, Write, stderr, stdout};
+use std::path::Path;
 use std::process::ExitCode;
-use std::sync::OnceLock;
+use std::sync::{Mutex, OnceLock, PoisonError};
 
 /// The first error that kept a line from standard output, if there was one.
 static FAILURE: OnceLock<String> = OnceLock::new();
@@ -33,6 +35,31 @@ pub fn line(text: impl Display) {
 pub fn note(text: impl Display) {
     let _ = writeln!(stderr(), "{text}");
 }
+
+/// As [`note`], but a text that this process has written before is not written again.
+pub fn note_once(text: String) {
+    static WRITTEN: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
+    let mut written = WRITTEN.lock().unwrap_or_else(PoisonError::into_inner);
+    if !written.contains(&text) {
+        note(&text);
+        written.insert(text);
+    }
+}
+
+/// What is said where a program's own files cannot be kept: `what` is not, because of the `cause` at `place`, none where the
+/// system names no folder. `variable` is the variable of the environment that names another one.
+pub fn not_kept(what: &str, place: Option<&Path>, cause: &str, variable: &str) -> String {
+    match place {
+        Some(place) => format!(
+            "{what}: {} cannot be written ({cause}); make its folder writable, or name another one by the variable {variable}",
+            place.display()
+        ),
+        None => format!("{what}: {cause}; set the variable HOME or {variable} to a folder"),
+    }
+}
+
+/// The cause where the system names no folder for a user's files.
+pub const NO_FOLDER: &str = "the system names no folder for it";
 
 /// A value as the text of a JSON file.
 ///

@@ -16,6 +16,7 @@ use std::thread;
 use std::time::Duration;
 
 use ash::vk;
+use insonify_base::output::{self, files};
 use parking_lot::Mutex;
 
 /// First bytes of a file; the number counts the format's versions.
@@ -34,10 +35,19 @@ pub(crate) const MESA_VARIABLES: [&str; 2] = ["LP_NATIVE_VECTOR_WIDTH", "MESA_SH
 /// Length of a wait after which the user is told its reason.
 const PATIENCE: Duration = Duration::from_secs(1);
 
+/// The variable of the environment that names the user's cache folder.
+const CACHE_VARIABLE: &str = "XDG_CACHE_HOME";
+/// What follows where nothing can be kept.
+const NOT_KEPT: &str = "compiled kernels are not kept, and the next start compiles them again";
+
 /// The folder for files that this program can make again: its own in the user's cache folder; none
-/// where the system names none.
+/// where the system names none, which is told once.
 pub fn cache_folder() -> Option<PathBuf> {
-    dirs::cache_dir().map(|folder| folder.join("insonify").join("pipelines"))
+    let folder = dirs::cache_dir().map(|folder| folder.join("insonify").join("pipelines"));
+    if folder.is_none() {
+        output::note_once(output::not_kept(NOT_KEPT, None, output::NO_FOLDER, CACHE_VARIABLE));
+    }
+    folder
 }
 
 /// The folder for kernels that Mesa compiles for this program, see [`super::prepare_process`]; none where the
@@ -90,7 +100,7 @@ impl PipelineStore {
             Some(Ok(Some(content))) => (known, data) = content,
             Some(Err(problem)) => {
                 let file = file.as_ref().map(|f| f.display().to_string());
-                insonify_base::output::note(format!(
+                output::note(format!(
                     "{}: {problem}; its kernels are compiled again",
                     file.unwrap_or_default()
                 ));
@@ -145,9 +155,7 @@ impl PipelineStore {
         thread::spawn(move || {
             let late = wait.recv_timeout(PATIENCE) == Err(RecvTimeoutError::Timeout);
             if late && !announced.swap(true, Ordering::Relaxed) {
-                insonify_base::output::note(format!(
-                    "compiling kernels for {device}, the first time only"
-                ));
+                output::note(format!("compiling kernels for {device}, the first time only"));
             }
         });
         Some(WaitNotice { _done: done })
@@ -169,10 +177,8 @@ impl PipelineStore {
             data.clear();
         }
         if let Err(error) = write(file, &encode(&known, &data)) {
-            insonify_base::output::note(format!(
-                "compiled kernels are not kept: {}: {error}",
-                file.display()
-            ));
+            let (place, cause) = (Some(file.as_path()), error.to_string());
+            output::note_once(output::not_kept(NOT_KEPT, place, &cause, CACHE_VARIABLE));
         }
     }
 
@@ -279,10 +285,7 @@ fn write(file: &Path, bytes: &[u8]) -> std::io::Result<()> {
     }
     let folder = file.parent().unwrap_or(Path::new("."));
     fs::create_dir_all(folder)?;
-    let part = file.with_extension(format!("{}.part", std::process::id()));
-    fs::write(&part, bytes)
-        .and_then(|()| fs::rename(&part, file))
-        .inspect_err(|_| drop(fs::remove_file(&part)))?;
+    files::replace(file, bytes)?;
     forget_oldest(folder)
 }
 

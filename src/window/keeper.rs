@@ -8,6 +8,7 @@ use std::fs::{File, create_dir_all, read_dir, remove_dir_all};
 use std::io::Error;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Sender, channel};
+use std::sync::{Arc, OnceLock};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
@@ -16,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use super::model::{Leftover, Model};
 use super::tools::Tools;
 use super::unsaved::Unsaved;
-use crate::output::files;
+use crate::output::{self, files};
 use crate::scene::file::{Entry, save};
 
 /// Least time between two writings.
@@ -25,6 +26,9 @@ const PAUSE: Duration = Duration::from_secs(2);
 const SCENE: &str = "scene.toml";
 const SESSION: &str = "session.json";
 const LOCK: &str = "lock";
+
+/// The variable of the environment that names the system's folder for the state of programs.
+pub(super) const STATE_VARIABLE: &str = "XDG_STATE_HOME";
 
 /// The program's folder in the system's one for the state of programs; none where the system has none.
 pub(super) fn state_folder() -> Option<PathBuf> {
@@ -94,11 +98,16 @@ pub(super) struct Keeper {
     /// State of the model at the last writing.
     kept: Option<[u64; 3]>,
     written: Instant,
+    /// The first reason for which nothing is kept, from the thread that writes, until it is taken.
+    fault: Arc<OnceLock<String>>,
+    /// True once it was taken.
+    told: bool,
 }
 
 impl Default for Keeper {
     fn default() -> Self {
-        Self { all: None, writer: None, kept: None, written: Instant::now() }
+        let fault = Arc::default();
+        Self { all: None, writer: None, kept: None, written: Instant::now(), fault, told: false }
     }
 }
 
@@ -147,6 +156,13 @@ impl Keeper {
         None
     }
 
+    /// The reason for which unsaved work is not kept, with the remedy; once.
+    pub(super) fn fault(&mut self) -> Option<&str> {
+        let fault = self.fault.get().filter(|_| !self.told)?;
+        self.told = true;
+        Some(fault)
+    }
+
     /// Forgets what is kept: it is saved, or the user wants none of it.
     pub(super) fn forget(&mut self) {
         self.kept = None;
@@ -161,10 +177,12 @@ impl Keeper {
     }
 
     fn send(&mut self, draft: Option<Draft>) {
-        if self.writer.is_none()
-            && let Some(all) = &self.all
-        {
-            self.writer = writer(all.clone());
+        match &self.all {
+            Some(all) if self.writer.is_none() => {
+                self.writer = writer(all.clone(), self.fault.clone());
+            }
+            Some(_) => {}
+            None => not_kept(&self.fault, None, output::NO_FOLDER),
         }
         if let Some((sender, _)) = &self.writer {
             // A writer that has died is told by `deaths`.
@@ -173,8 +191,19 @@ impl Keeper {
     }
 }
 
+/// Notes why nothing is kept, and tells it where nobody sees the window; once.
+fn not_kept(fault: &OnceLock<String>, place: Option<&Path>, cause: &str) {
+    let what = "unsaved work is not kept for the case of a crash or a power cut";
+    output::note_once(
+        fault.get_or_init(|| output::not_kept(what, place, cause, STATE_VARIABLE)).clone(),
+    );
+}
+
 /// Starts the thread that writes; none where the system has no room for one, which other threads tell.
-fn writer(all: PathBuf) -> Option<(Sender<Option<Draft>>, JoinHandle<()>)> {
+fn writer(
+    all: PathBuf,
+    fault: Arc<OnceLock<String>>,
+) -> Option<(Sender<Option<Draft>>, JoinHandle<()>)> {
     let (sender, drafts) = channel::<Option<Draft>>();
     let work = move || {
         let mut own: Option<(PathBuf, File)> = None;
@@ -186,7 +215,7 @@ fn writer(all: PathBuf) -> Option<(Sender<Option<Draft>>, JoinHandle<()>)> {
                 None => own.take().map_or(Ok(()), |(folder, _)| remove_dir_all(folder)),
             };
             if let Err(error) = done {
-                crate::output::note(format!("unsaved work is not kept: {error}"));
+                not_kept(&fault, Some(&all), &error.to_string());
             }
         }
     };
@@ -232,4 +261,38 @@ fn taken_up(folder: &Path, scene: &Path) -> Option<Orphan> {
 
 fn now() -> u64 {
     SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn draft() -> Option<Draft> {
+        let left = Leftover { marks: Default::default(), recording: None };
+        let session = Session { scene: "/nowhere.toml".into(), at: 0, what: Vec::new(), left };
+        Some(Draft { entries: Vec::new(), session })
+    }
+
+    #[test]
+    fn where_nothing_can_be_kept_it_is_told_once_with_place_and_remedy() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("file");
+        std::fs::write(&file, "no folder").expect("written");
+        let below = file.join("unsaved");
+        for all in [Some(below.clone()), None] {
+            let is_named = all.is_some();
+            let mut keeper = Keeper { all, ..Keeper::default() };
+            assert_eq!(keeper.fault(), None);
+            keeper.send(draft());
+            keeper.send(draft());
+            // The thread has then done all of it.
+            keeper.forget();
+            let said = keeper.fault().expect("nothing is kept").to_owned();
+            let named = said.contains(&below.display().to_string());
+            assert!(named == is_named && said.contains(STATE_VARIABLE), "{said}");
+            keeper.send(draft());
+            keeper.forget();
+            assert_eq!(keeper.fault(), None, "it was told");
+        }
+    }
 }

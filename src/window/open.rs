@@ -237,8 +237,11 @@ impl Open {
     /// Keeps what is unsaved; returns when to do so again.
     fn keep(&mut self, now: Instant) -> Option<Instant> {
         let mut keeper = std::mem::take(&mut self.state.keeper);
-        let common = &self.state.common;
+        let common = &mut self.state.common;
         let due = keeper.keep(&self.model, &common.tools, common.files.with_pose, now);
+        if let Some(fault) = keeper.fault() {
+            common.tools.notices.warn(fault.to_owned());
+        }
         self.state.keeper = keeper;
         due
     }

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::keeper;
-use crate::output::files;
+use crate::output::{self, files};
 use crate::scene::shipped;
 
 /// Most files that are remembered.
@@ -22,13 +22,18 @@ pub(super) fn before(path: &Path) -> Vec<PathBuf> {
     list().into_iter().filter(|file| *file != open).collect()
 }
 
-/// Puts a file at the head of the list, unless it ships: the gallery shows those. Where the list cannot be written it stays
-/// as it is: nothing depends on it.
+/// Puts a file at the head of the list, unless it ships: the gallery shows those. Where the list cannot be written, which is
+/// told once, it stays as it is.
 pub(super) fn add(file: &Path) {
-    let (Some(place), Ok(file)) = (place(), file.canonicalize()) else { return };
+    let not_kept = |place: Option<&Path>, cause: &str| {
+        let what = "the files that were opened are not remembered";
+        output::note_once(output::not_kept(what, place, cause, keeper::STATE_VARIABLE));
+    };
+    let Ok(file) = file.canonicalize() else { return };
     if shipped::is_shipped(&file) {
         return;
     }
+    let Some(place) = place() else { return not_kept(None, output::NO_FOLDER) };
     let known = list();
     if known.first() == Some(&file) {
         return;
@@ -40,7 +45,10 @@ pub(super) fn add(file: &Path) {
         .filter_map(|file| file.to_str().filter(|name| !name.contains('\n')).map(str::to_owned))
         .collect();
     let made = place.parent().map_or(Ok(()), std::fs::create_dir_all);
-    let _ = made.and_then(|()| files::replace(&place, (lines.join("\n") + "\n").as_bytes()));
+    let written = made.and_then(|()| files::replace(&place, (lines.join("\n") + "\n").as_bytes()));
+    if let Err(cause) = written {
+        not_kept(Some(&place), &cause.to_string());
+    }
 }
 
 fn place() -> Option<PathBuf> {

@@ -9,6 +9,8 @@ use super::tools::Tools;
 
 /// Time for which a message about a saved file is shown.
 const SHOWN: Duration = Duration::from_secs(6);
+/// Time for which a warning is shown: longer than anybody works.
+const LASTING: Duration = Duration::from_secs(24 * 3600);
 /// Time between drawings of the progress.
 const STEP: Duration = Duration::from_millis(100);
 
@@ -25,6 +27,11 @@ impl Notices {
     pub(super) fn tell(&mut self, text: String) {
         self.failed = None;
         self.saved.push((text, Instant::now() + SHOWN));
+    }
+
+    /// Adds a message that stays until it is clicked.
+    pub(super) fn warn(&mut self, text: String) {
+        self.saved.push((text, Instant::now() + LASTING));
     }
 
     /// Takes away what was said of the capture before another one.

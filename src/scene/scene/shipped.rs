@@ -6,7 +6,7 @@ use std::path::{Component, Path, PathBuf};
 
 use flate2::read::GzDecoder;
 
-use crate::output::files;
+use crate::output::{self, files};
 
 static ARCHIVE: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/scenes.tar.gz"));
 
@@ -41,26 +41,49 @@ pub fn find(path: &Path) -> Result<PathBuf> {
     }
 }
 
-/// The file of the scene of this name, unpacked.
+/// The file of the scene of this name, unpacked: into the user's folder of data, and where that cannot be, which is told once,
+/// into the system's folder for passing files.
 ///
 /// # Errors
 /// There is no place to unpack it to.
 pub fn unpacked(name: &str) -> Result<PathBuf> {
-    let folder = folder().ok_or_else(|| Error::other("there is no folder for a user's data"))?;
-    unpack(&folder).map_err(|e| {
-        Error::new(
-            e.kind(),
-            format!("unpacking the scenes that ship into {}: {e}", folder.display()),
-        )
+    unpacked_into(folder(), &passing(), name)
+}
+
+/// As [`unpacked`], into the folder `own` or `passing`.
+fn unpacked_into(own: Option<PathBuf>, passing: &Path, name: &str) -> Result<PathBuf> {
+    let file = format!("{name}.toml");
+    let tried = own.as_ref().map(|folder| unpack(folder, same_size));
+    let (place, cause) = match (own, tried) {
+        (Some(folder), Some(Ok(()))) => return Ok(folder.join(file)),
+        (folder, Some(Err(cause))) => (folder, cause.to_string()),
+        (folder, _) => (folder, output::NO_FOLDER.to_owned()),
+    };
+    let what = format!(
+        "the scenes that ship are unpacked into {}, which the system empties now and then, and what is saved from them names \
+         meshes there",
+        passing.display()
+    );
+    let said = output::not_kept(&what, place.as_deref(), &cause, "XDG_DATA_HOME");
+    // Others may write there, too: what is there is compared to the last byte.
+    unpack(passing, same_bytes).map_err(|e| {
+        let remedy = "make one of them writable, or name other ones by the variables XDG_DATA_HOME and TMPDIR";
+        let own = place.as_ref().map_or(String::new(), |place| format!("{}: ", place.display()));
+        let message = format!(
+            "the scenes that ship cannot be unpacked ({own}{cause}; {}: {e}); {remedy}",
+            passing.display()
+        );
+        Error::new(e.kind(), message)
     })?;
-    Ok(folder.join(format!("{name}.toml")))
+    output::note_once(said);
+    Ok(passing.join(file))
 }
 
 /// True for files that were unpacked: they are to stay as they ship.
 pub fn is_shipped(path: &Path) -> bool {
-    let own = folder().and_then(|folder| folder.canonicalize().ok());
-    let path = path.canonicalize();
-    own.is_some_and(|own| path.is_ok_and(|path| path.starts_with(own)))
+    let Ok(path) = path.canonicalize() else { return false };
+    let mut own = folder().into_iter().chain([passing()]);
+    own.any(|own| own.canonicalize().is_ok_and(|own| path.starts_with(own)))
 }
 
 /// The way from `folder` to a scene's file, for what is written there and handed on: the name of a scene that ships; the
@@ -97,6 +120,11 @@ fn folder() -> Option<PathBuf> {
     dirs::data_local_dir().map(|data| data.join("insonify").join(format!("scenes-{STAMP:08x}")))
 }
 
+/// The folder where there is no other.
+fn passing() -> PathBuf {
+    std::env::temp_dir().join(format!("insonify-scenes-{STAMP:08x}"))
+}
+
 /// The scene that ships under this name: `heart`, `heart.toml` or `scenes/heart.toml`.
 pub fn named(path: &Path) -> Option<&'static str> {
     let bare =
@@ -107,24 +135,33 @@ pub fn named(path: &Path) -> Option<&'static str> {
     SCENES.iter().map(|scene| scene.name).find(|name| *name == stem)
 }
 
-/// Writes the files of the archive that are not in `folder` as they should be.
-fn unpack(folder: &Path) -> Result<()> {
-    let is_there = |&(name, size): &(&str, u64)| {
-        std::fs::metadata(folder.join(name)).is_ok_and(|file| file.len() == size)
-    };
-    if FILES.iter().all(is_there) {
+/// True for a file of the size that a file of the archive has.
+fn same_size(path: &Path, size: u64, _: Option<&[u8]>) -> bool {
+    std::fs::metadata(path).is_ok_and(|file| file.len() == size)
+}
+
+/// True for a file with the bytes of one of the archive; false without looking where they are not known yet.
+fn same_bytes(path: &Path, size: u64, bytes: Option<&[u8]>) -> bool {
+    let read = || std::fs::read(path).ok();
+    bytes.is_some_and(|bytes| same_size(path, size, None) && read().as_deref() == Some(bytes))
+}
+
+/// Writes the files of the archive that are not in `folder` as they should be: by `is_there`, which is told size and bytes,
+/// none as long as they are packed.
+fn unpack(folder: &Path, is_there: fn(&Path, u64, Option<&[u8]>) -> bool) -> Result<()> {
+    if FILES.iter().all(|&(name, size)| is_there(&folder.join(name), size, None)) {
         return Ok(());
     }
     let mut archive = tar::Archive::new(GzDecoder::new(ARCHIVE));
     for entry in archive.entries()? {
         let mut entry = entry?;
         let path = folder.join(entry.path()?);
-        if std::fs::metadata(&path).is_ok_and(|file| file.len() == entry.size()) {
+        let mut bytes = Vec::new();
+        entry.read_to_end(&mut bytes)?;
+        if is_there(&path, bytes.len() as u64, Some(&bytes)) {
             continue;
         }
         std::fs::create_dir_all(path.parent().expect("it lies in the folder"))?;
-        let mut bytes = Vec::new();
-        entry.read_to_end(&mut bytes)?;
         files::replace(&path, &bytes)?;
     }
     Ok(())
@@ -171,7 +208,7 @@ mod tests {
     #[test]
     fn all_that_ships_comes_out_as_it_went_in_and_is_mended() {
         let folder = tempfile::tempdir().expect("a folder");
-        unpack(folder.path()).expect("room");
+        unpack(folder.path(), same_size).expect("room");
         let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
         for (name, _) in FILES {
             let [there, here] = [&source, folder.path()].map(|at| std::fs::read(at.join(name)));
@@ -185,12 +222,34 @@ mod tests {
         let broken = folder.path().join("heart.toml");
         std::fs::write(&broken, "half").expect("written");
         std::fs::remove_file(folder.path().join("fetus/sac.obj")).expect("it was there");
-        unpack(folder.path()).expect("room");
+        unpack(folder.path(), same_size).expect("room");
         assert_eq!(
             std::fs::read(&broken).expect("there"),
             std::fs::read(source.join("heart.toml")).expect("there")
         );
         assert!(folder.path().join("fetus/sac.obj").exists());
+    }
+
+    #[test]
+    fn without_a_folder_of_data_they_come_out_elsewhere_and_are_not_anybodys() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let [file, passing] = ["file", "passing"].map(|name| folder.path().join(name));
+        std::fs::write(&file, "no folder").expect("written");
+        // What another user has put there, of the right size.
+        let (name, size) = FILES.iter().find(|(name, _)| *name == "heart.toml").expect("it ships");
+        std::fs::create_dir(&passing).expect("made");
+        std::fs::write(passing.join(name), vec![b'#'; *size as usize]).expect("written");
+        for own in [None, Some(file.join("below"))] {
+            let heart = unpacked_into(own, &passing, "heart").expect("room");
+            assert_eq!(heart, passing.join("heart.toml"));
+            let [source, found] =
+                [Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes"), passing.clone()]
+                    .map(|at| std::fs::read(at.join(name)).expect("there"));
+            assert!(source == found);
+            assert!(Scene::load(&heart, &[]).is_ok());
+        }
+        let none = unpacked_into(None, &file, "heart").expect_err("no place").to_string();
+        assert!(none.contains("file") && none.contains("TMPDIR"), "{none}");
     }
 
     #[test]

@@ -6,6 +6,7 @@ use dicom_core::chrono::{DateTime, Local};
 use egui::{Button, RichText, ScrollArea, TextStyle, Ui, vec2};
 
 use super::show_score;
+use crate::output;
 use crate::style::{self, button};
 use crate::teach::history::{self, Entry};
 
@@ -22,12 +23,13 @@ pub(super) fn folder() -> Option<PathBuf> {
 }
 
 /// What is said where [`folder`] is none.
-const NOWHERE: &str =
-    "there is no folder for a user's data, so that no history is kept; set the variable HOME";
+fn nowhere() -> String {
+    output::not_kept("no history is kept", None, output::NO_FOLDER, "XDG_DATA_HOME")
+}
 
 /// Notes an attempt in the learner's history.
 pub(super) fn note(folder: Option<PathBuf>, entry: &Entry) -> Result<(), String> {
-    let folder = folder.ok_or(NOWHERE)?;
+    let folder = folder.ok_or_else(nowhere)?;
     history::add(&folder, entry).map_err(|e| format!("{e}; {}", e.remedy))
 }
 
@@ -47,7 +49,7 @@ impl Page {
     pub(super) fn of(learner: &str) -> Self {
         let read =
             |at: PathBuf| history::read(&at, learner).map_err(|e| format!("{e}; {}", e.remedy));
-        let attempts = folder().ok_or(NOWHERE.to_owned()).and_then(read);
+        let attempts = folder().ok_or_else(nowhere).and_then(read);
         Self { learner: learner.to_owned(), attempts, all: false, chosen: usize::MAX }
     }
 
