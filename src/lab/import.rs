@@ -4,9 +4,9 @@
 //! sides of a border: `composed` parts what touches along an edge, `nets` makes all surfaces at once, `relax` smooths
 //! them, `surface` takes one out; `map` does all of this, for the `masks` of a folder, too. A folder of meshes goes through
 //! `folder`, compared with each other by `raster`. `table` says which tissue a structure is made of, `hull`
-//! makes up a skin where there is none, `pose` finds a place on it from which an organ is seen, `draft` writes the
-//! scene. Configurations of PLUS (`plus`) become scenes by `device_set`, poses of sequences rows of a `trajectory`. Knows no
-//! Vulkan.
+//! makes up a skin where there is none, `pose` finds a place on it from which an organ is seen, `plausible` doubts volumes
+//! that no organ has, `draft` writes the scene. Configurations of PLUS (`plus`) become scenes by `device_set`, poses of
+//! sequences rows of a `trajectory`. Knows no Vulkan.
 
 use glam::DVec3;
 
@@ -26,6 +26,7 @@ pub mod map;
 mod masks;
 mod names;
 pub mod nets;
+mod plausible;
 mod plus;
 mod pose;
 pub mod raster;

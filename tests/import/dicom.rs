@@ -224,9 +224,20 @@ fn shares_count_from_half_of_a_whole_pixel_on() {
         let found = count(shares(inside, outside, most));
         assert_eq!(found, Ok(whole), "{inside}, {outside} of {most:?}");
     }
-    // Below half everywhere nothing is there, and that is an error.
-    let found = count(shares(49, 0, Some(100)));
-    assert!(found.as_ref().is_err_and(|e| e.contains("has a pixel")), "{found:?}");
+    // Below half everywhere nothing is there, and that is an error, whose remedy has the numbers of the file.
+    let import = |pixels: Pixels| {
+        std::fs::write(&file, segmentation([30, 16, 12], pixels, inside)).expect("written");
+        insonify(folder.path(), &["import", "s.dcm", "-o", "out"])
+    };
+    for (largest, most, parts) in [
+        (49, Some(100), ["49 at most, and count from 50 on", "half of 100"]),
+        (1, Some(255), ["1 at most, and count from 128 on", "(0062,000E) to 1"]),
+        (9, None, ["9 at most, and count from 128 on", "has no MaximumFractionalValue"]),
+        (0, Some(255), ["has a pixel: all are 0", "drawn in it"]),
+    ] {
+        let (done, said) = import(shares(largest, 0, most));
+        assert!(!done && parts.iter().all(|part| said.contains(part)), "{said}");
+    }
 }
 
 /// The pixels of a label map are the numbers of its segments.

@@ -1,6 +1,7 @@
 //! Folders of meshes.
 
 use glam::DVec3;
+use insonify::output::lock::{Hold, LOCK};
 use insonify::scene::{Scene, shapes};
 
 use crate::common::program::insonify;
@@ -104,4 +105,38 @@ fn an_open_skin_is_closed_so_that_a_probe_can_be_held_to_it() {
     assert!(done && said.contains("the skin had 2 openings, which were closed flat"), "{said}");
     let (passed, said) = insonify(folder, &["check", "out/scene.toml"]);
     assert!(passed && said.contains("0 errors"), "{said}");
+}
+
+/// Volumes that no organ has, and a folder that another import writes.
+#[test]
+fn implausible_volumes_are_told_with_their_cause_and_two_imports_do_not_mix() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let folder = folder.path();
+    let organs = folder.join("organs");
+    std::fs::create_dir(&organs).expect("made");
+    // 1.4 l and 0.1 l, in cm.
+    for (name, radius, left) in [("liver.obj", 6.95, -8.0), ("spleen.obj", 2.9, 6.0)] {
+        let ball = obj(&shapes::sphere(radius, 3), DVec3::new(left, 0.0, 0.0));
+        std::fs::write(organs.join(name), ball).expect("written");
+    }
+    let (done, said) = insonify(folder, &["import", "organs", "-o", "right", "--units", "cm"]);
+    assert!(done && !said.contains("ICRP 89"), "{said}");
+    let (done, said) = insonify(folder, &["import", "organs", "-o", "wrong"]);
+    assert!(done, "{said}");
+    for name in ["liver", "spleen"] {
+        let cause = ["ml, and adults have", "ten times too small", "--units cm"];
+        let warned = said.split("warning: ").find(|part| part.starts_with(&format!("{name}: ")));
+        let warned = warned.unwrap_or_else(|| panic!("{name}: {said}"));
+        assert!(cause.iter().all(|part| warned.contains(part)), "{warned}");
+    }
+    let held = Hold::take(&folder.join("right").join(LOCK)).expect("room").expect("nobody's");
+    let again = ["import", "organs", "-o", "right", "--force", "--units", "cm"];
+    let (done, said) = insonify(folder, &again);
+    assert!(
+        !done && said.contains("right") && said.contains("written by another import"),
+        "{said}"
+    );
+    drop(held);
+    assert!(insonify(folder, &again).0);
+    assert!(!folder.join("right").join(LOCK).exists());
 }

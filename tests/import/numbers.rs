@@ -183,3 +183,32 @@ fn two_places_in_one_header_are_told() {
     let (done, said) = with(&[(280, &[0; 48])]);
     assert!(!done, "{said}");
 }
+
+/// Masks of one structure, as they are and divided by their largest value: what is to be done is said.
+#[test]
+fn masks_are_told_what_they_are_and_shares_how_they_become_one() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let folder = folder.path();
+    let all = labels();
+    let import = |bytes: Vec<u8>| {
+        std::fs::write(folder.join("m.nrrd"), bytes).expect("written");
+        insonify(folder, &["import", "m.nrrd", "-o", "mask", "--force"])
+    };
+    for inside in [1u8, 255] {
+        let mask: Vec<u8> = all.iter().map(|v| if *v > 0 { inside } else { 0 }).collect();
+        let (done, said) = import(nrrd("uint8", &mask));
+        assert!(done, "{said}");
+        for part in
+            [&format!("{inside} is the only value besides 0"), "--labels", "folder of masks"]
+        {
+            assert!(said.contains(part), "{part}: {said}");
+        }
+    }
+    for inside in [1.0 / 255.0, 0.5] {
+        let share = |v: &i64| if *v > 0 { inside } else { 0f32 };
+        let shares: Vec<u8> = all.iter().flat_map(|v| share(v).to_le_bytes()).collect();
+        let (done, said) = import(nrrd("float", &shares));
+        let remedy = said.contains("shares of voxels") && said.contains("give whole numbers");
+        assert!(!done && remedy, "{inside}: {said}");
+    }
+}

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
+use super::plausible;
 use super::pose::View;
 use super::table::UNKNOWN;
 use crate::issue::FileError;
@@ -162,11 +163,14 @@ impl Draft {
         }
     }
 
-    /// Remarks for a person: structures that are no mesh, what is remarkable, and structures whose tissue is a guess.
+    /// Remarks for a person: structures that are no mesh, what is remarkable, volumes that no organ has, and structures whose
+    /// tissue is a guess.
     pub fn messages(&self) -> Vec<String> {
         let left_out = self.left_out.iter();
         let left_out = left_out.map(|part| format!("left out: {part}, which no scene takes"));
         let remarks = self.remarks.iter().map(|remark| format!("note: {remark}"));
+        let doubts = self.parts.iter().filter_map(plausible::doubt);
+        let doubts = doubts.map(|doubt| format!("warning: {doubt}"));
         let unknown = self.parts.iter().filter(|part| !part.known);
         let unknown: Vec<_> = unknown.map(|part| part.name.as_str()).collect();
         let guessed = (!unknown.is_empty()).then(|| {
@@ -176,7 +180,7 @@ impl Draft {
                 unknown.join(", ")
             )
         });
-        left_out.chain(remarks).chain(guessed).collect()
+        left_out.chain(remarks).chain(doubts).chain(guessed).collect()
     }
 
     /// Writes the scene file, and returns where it is.

@@ -58,7 +58,7 @@ impl LabelMap {
         if (extension == "dcm" || extension == "dicom")
             && let Some(found) = Segmentation::load(path)?
         {
-            return of_dicom(path, found);
+            return Ok(of_dicom(found));
         }
         if (extension == "mha" || extension == "mhd") && Summary::read(path)?.is_some() {
             let message = "is a tracked sequence: images and no label map";
@@ -269,11 +269,7 @@ impl<'p> Merging<'p> {
     }
 }
 
-fn of_dicom(path: &Path, found: Segmentation) -> Result<LabelMap, FileError> {
-    if found.layers.iter().flatten().all(|v| *v == 0) {
-        let message = "none of its segments has a pixel";
-        return Err(FileError::file(path, message, "give the segmentation"));
-    }
+fn of_dicom(found: Segmentation) -> LabelMap {
     let segment = |s: DicomSegment| Segment { layer: 0, value: s.number.into(), names: s.names };
     let Segmentation { size, world_from_voxel, layers, segments } = found;
     let labels: Vec<Segment> = segments.into_iter().map(segment).collect();
@@ -285,7 +281,7 @@ fn of_dicom(path: &Path, found: Segmentation) -> Result<LabelMap, FileError> {
     // What others leave around the segments may be described as one.
     let missing = missing.filter(|(_, label)| label.value > 0);
     let remarks = missing.map(|(_, label)| empty(label)).collect();
-    Ok(LabelMap { size, world_from_voxel, layers, masks: Vec::new(), labels, remarks })
+    LabelMap { size, world_from_voxel, layers, masks: Vec::new(), labels, remarks }
 }
 
 /// The remark on a segment without a voxel.
@@ -347,6 +343,8 @@ fn distinct(
     before: usize,
 ) -> Result<(Vec<u32>, f64), FileError> {
     const REMEDY: &str = "give a label map: a whole number for each structure, 0 around them";
+    const SHARES: &str = "if these are shares of voxels, or a mask divided by its largest value, give whole numbers: 1 from \
+                          half of a voxel on, 0 below";
     let mut seen = BTreeMap::new();
     let (mut last, mut most) = (0.0, 0.0f64);
     for value in voxels {
@@ -357,7 +355,8 @@ fn distinct(
         let (whole, off) = (value.round(), (value - value.round()).abs());
         if !(0.0..=MAX_VALUE).contains(&whole) || off > OFF {
             let message = format!("has voxels of {value}: an image and no label map");
-            return Err(FileError::file(path, message, REMEDY));
+            let is_share = value > 0.0 && value < 1.0;
+            return Err(FileError::file(path, message, if is_share { SHARES } else { REMEDY }));
         }
         most = most.max(off);
         if whole > 0.0 {
@@ -368,6 +367,10 @@ fn distinct(
                 format!("has more than {} different values: an image and no label map", Grid::MOST);
             return Err(FileError::file(path, message, REMEDY));
         }
+    }
+    if seen.is_empty() && most > 0.0 {
+        let message = format!("has no voxel above {most}: no structure is labelled");
+        return Err(FileError::file(path, message, SHARES));
     }
     Ok((seen.into_keys().collect(), most))
 }

@@ -7,6 +7,7 @@ use glam::{DAffine3, DVec3};
 use super::draft::{Draft, Part, SKIN};
 use super::grid::Grid;
 use super::labels::{Covered, LabelMap, Merged};
+use super::names::Segment;
 use super::pose::{self, Task};
 use super::surface::Surfaces;
 use super::table::{Entry, OUTLINE};
@@ -84,6 +85,7 @@ pub fn import(
     let mut surfaces = Surfaces::new(&grid, &net);
     let mut draft = Draft::begin(folder, path, options.force)?;
     draft.remarks = remarks;
+    draft.remarks.extend(single(&labels, &entries));
     // The skin is around all of them.
     let organs = covered.iter().filter(|found| entries[found.label].priority != OUTLINE);
     draft.remarks.extend(organs.map(|found| overlap(found, &entries)));
@@ -150,6 +152,17 @@ fn overlap(found: &Covered, entries: &[Entry]) -> String {
             )
         }
     }
+}
+
+/// The remark on a label map of one value of which nobody says what it is.
+fn single(labels: &[Segment], entries: &[Entry]) -> Option<String> {
+    let ([Segment { value, .. }], [Entry { known: false, .. }]) = (labels, entries) else {
+        return None;
+    };
+    Some(format!(
+        "{value} is the only value besides 0, as in the mask of one structure: say which one by a table (--labels) with the value \
+         {value}, or import a folder of masks, each file named after its structure"
+    ))
 }
 
 /// A part as the table has it.

@@ -109,7 +109,7 @@ impl Table {
 
 /// Words of a name for comparison: lower case, singular, split where letters end, where digits begin or end, and where
 /// capitals begin.
-fn words(name: &str) -> Vec<String> {
+pub(super) fn words(name: &str) -> Vec<String> {
     let mut split = String::new();
     let mut last = ' ';
     for c in name.chars() {

@@ -48,7 +48,7 @@ impl Segmentation {
     /// Reads a segmentation; none where the file is of another kind.
     ///
     /// # Errors
-    /// A file that is no DICOM; frames that do not fit their segments, places or pixels.
+    /// A file that is no DICOM; frames that do not fit their segments, places or pixels; segments without a pixel.
     pub fn load(path: &Path) -> Result<Option<Self>, FileError> {
         let dicom = file::read(path)?;
         let elements = dicom.elements();
@@ -126,6 +126,9 @@ impl Segmentation {
                 at.layers(&dicom, voxels, &order, kind.threshold(pixels, bits))?
             }
         };
+        if layers.iter().flatten().all(|label| *label == 0) {
+            return Err(kind.nothing(&dicom, pixels, bits));
+        }
         Ok(Some(Self { size, world_from_voxel, layers, segments }))
     }
 }
@@ -165,6 +168,29 @@ impl SegmentationType {
             Self::Shares { .. } => bits == 8,
             Self::LabelMap => bits == 8 || bits == 16,
         }
+    }
+
+    /// The error of a file none of whose pixels belongs to a segment.
+    fn nothing(self, dicom: &Dicom, pixels: &[u8], bits: usize) -> FileError {
+        let (message, largest) = ("none of its segments has a pixel", pixels.iter().max().copied());
+        let (Self::Shares { most }, Some(largest @ 1..)) = (self, largest) else {
+            let message = format!("{message}: all are 0");
+            return dicom.error(message, "give the segmentation with what was drawn in it");
+        };
+        let whole = match most {
+            Some(most) => format!("{most}, its MaximumFractionalValue"),
+            None => format!("{WHOLE}, as it has no MaximumFractionalValue"),
+        };
+        dicom.error(
+            format!(
+                "{message}: its shares are {largest} at most, and count from {} on, half of {whole}",
+                self.threshold(pixels, bits)
+            ),
+            &format!(
+                "if {largest} means that a pixel lies inside, set MaximumFractionalValue (0062,000E) to {largest}, or save the \
+                 file as BINARY with 0 and 1"
+            ),
+        )
     }
 
     /// The least value of a pixel that belongs to its segment: half of a whole one.
