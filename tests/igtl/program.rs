@@ -175,6 +175,21 @@ fn commands_set_any_key_time_and_scene_and_are_answered() {
     let Content::String { text, .. } = answer.content else { panic!("no text") };
     let said = String::from_utf8(text).expect("UTF-8");
     assert!(answer.device.is("me") && said.contains("mesh"), "{said}");
+    // A STRING whose device is the key, as a COMMAND's name is, and one that was cut on its way.
+    for (device, text, expected) in [
+        ("probe.depth", "81 mm", "probe.depth = 81 mm"),
+        ("get", "probe.depth", "probe.depth = \"81 mm\""),
+        ("probe.depth", "900 MHz", "error: "),
+        ("simulation.density_scale", "0.5", "error: `simulation.density_s` is no key"),
+    ] {
+        let text = text.as_bytes().to_vec();
+        client.send(&Message::new(device, Content::String { encoding: 3, text }));
+        let Content::String { text, .. } = client.receive_kind("STRING").content else {
+            panic!("no text")
+        };
+        let said = String::from_utf8(text).expect("UTF-8");
+        assert!(said.starts_with(expected), "{device}: {said}");
+    }
     // What is nested deeper than the stack allows.
     for parts in [17, 12_000, 30_000] {
         let text = format!("{} = 1", vec!["a"; parts].join(".")).into_bytes();

@@ -85,7 +85,7 @@ pub(super) fn answer(client: &Client, shared: &Shared, message: &Message) -> Res
             let pose = |tool: &PlacedTool| (tool.name, message::matrix(tool.place, tool.turn));
             poses(shared, message, tools.iter().map(pose))
         }
-        content => match Order::of_message(content) {
+        _ => match Order::of_message(message) {
             Some(order) => take(client, shared, message, order),
             None => reply(client, shared, message),
         },

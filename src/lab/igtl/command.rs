@@ -7,7 +7,7 @@ use super::answer::respond;
 use super::client::{Answer, Client};
 use super::message::{Content, ExtendedHeader, Message};
 use super::wire::Label;
-use crate::scene::file::keys_below;
+use crate::scene::file::{facts, keys_below, paths};
 use crate::settings::units::DURATION;
 
 /// Number of UTF-8 in the MIB of IANA.
@@ -69,24 +69,51 @@ impl Order {
         }
     }
 
-    /// The order of a message; none of messages that carry none. The name of a COMMAND is a key where its text is but a
-    /// value, and the whole command where it has no text.
-    pub(super) fn of_message(content: &Content) -> Option<Result<Self, String>> {
-        let (name, text) = match content {
-            Content::String { text, .. } => (String::new(), text),
-            Content::Command { reply: false, name, text, .. } => (name.text().into_owned(), text),
+    /// The order of a message; none of messages that carry none. The name of a COMMAND, and the device of a STRING, is a key
+    /// where the text is but a value, and the whole command where there is no text.
+    pub(super) fn of_message(message: &Message) -> Option<Result<Self, String>> {
+        let (name, room, text) = match &message.content {
+            Content::String { text, .. } => (message.device.text(), message.device.room(), text),
+            Content::Command { reply: false, name, text, .. } => (name.text(), name.room(), text),
             _ => return None,
         };
         let text = String::from_utf8_lossy(text);
-        let text = text.trim_matches(['\0', ' ', '\n', '\r']);
-        let is_whole = name.is_empty() || name == "set" || text.contains('=');
-        Some(match (text.is_empty(), is_whole, &*name) {
-            (true, _, name) => Self::of(name),
-            (false, true, _) => Self::of(text),
-            (false, false, "get") => Ok(Self::Get(text.to_owned())),
-            (false, false, key) => Self::of(&format!("{key} = {text}")),
-        })
+        Some(Self::of_named(&name, room, text.trim_matches(['\0', ' ', '\n', '\r'])))
     }
+
+    /// The order of a text under a name, in a field with `room` bytes for that.
+    fn of_named(name: &str, room: usize, text: &str) -> Result<Self, String> {
+        let own = Self::of(text);
+        let is_key = |name: &str| facts(name).is_ok() || ["time", "scene"].contains(&name);
+        // A value may have equals signs of its own, as that of a pose has.
+        let is_whole = match &own {
+            Ok(Self::Set(pairs)) => pairs.iter().all(|(path, _)| is_key(path)),
+            Ok(_) => true,
+            Err(_) => false,
+        };
+        match name {
+            _ if text.is_empty() => Self::of(name),
+            "get" => Ok(Self::Get(text.to_owned())),
+            _ if is_whole => own,
+            "time" | "scene" => Self::of(&format!("{name} = {text}")),
+            _ if name.len() == room && !is_key(name) => Err(cut(name)),
+            _ if is_key(name) || name.contains('.') => {
+                Ok(Self::Set(vec![(name.to_owned(), text.to_owned())]))
+            }
+            _ => own,
+        }
+    }
+}
+
+/// The remedy for a name as long as names can be that is no key: it may have been cut.
+fn cut(name: &str) -> String {
+    let whole = paths().find(|path| path.starts_with(name));
+    format!(
+        "`{name}` is no key, and has {} bytes, the most that OpenIGTLink has room for there; longer names are cut: write the key \
+         into the text, as {} = VALUE",
+        name.len(),
+        whole.as_deref().unwrap_or("PATH")
+    )
 }
 
 /// A simulation that clients command.
@@ -224,14 +251,45 @@ mod tests {
     }
 
     #[test]
-    fn a_command_may_say_its_key_in_its_name() {
-        let of = |name, text| Order::of_message(&command(1, name, text).content).expect("an order");
+    fn commands_and_strings_may_have_a_key_as_their_name() {
+        let string = |name: &str, text: &str| {
+            let text = text.as_bytes().to_vec();
+            let message = Message::new(name, Content::String { encoding: UTF8, text });
+            Order::of_message(&message).expect("an order")
+        };
+        let of = |name: &str, text: &str| {
+            let order = Order::of_message(&command(1, name, text)).expect("an order");
+            assert_eq!(string(name, text), order, "{name}");
+            order
+        };
         let set = Order::of("probe.depth = 80 mm");
         assert_eq!(of("probe.depth", "80 mm"), set);
-        assert_eq!(of("set", "probe.depth = 80 mm"), set);
-        assert_eq!(of("", "probe.depth = 80 mm"), set);
+        for name in ["set", "", "Text", "probe.depth", "imaging.gain"] {
+            assert_eq!(of(name, "probe.depth = 80 mm"), set, "{name}");
+            assert_eq!(of(name, "unfreeze"), Ok(Order::Freeze(false)), "{name}");
+        }
         assert_eq!(of("freeze", ""), Ok(Order::Freeze(true)));
         assert_eq!(of("get", "imaging.gain"), Order::of("get imaging.gain"));
         assert_eq!(of("time", "2 s\0"), Ok(Order::Time(2.0)));
+        assert_eq!(of("scene", "heart"), Ok(Order::Scene("heart".to_owned())));
+        // A value with equals signs, and a key that there is not, whose error names those that there are.
+        for (name, text) in [
+            ("probe.pose", "{ position = [0, 0, 0] }"),
+            ("imaging.gian", "3"),
+            ("tissues.liver.speed", "1550 m/s"),
+        ] {
+            let set = Order::Set(vec![(name.to_owned(), text.to_owned())]);
+            assert_eq!(of(name, text), Ok(set), "{name}");
+        }
+        // Names that are no keys say nothing.
+        assert!(of("Text", "louder").is_err_and(|cause| cause.contains("`louder` is no command")));
+        // As a STRING arrives: 24 letters are cut to 20. A COMMAND has room for 128.
+        let [key, text] = ["simulation.density_scale", "simulation.density_scale = 0.5"];
+        let cut = string(key, "0.5").expect_err("no key");
+        for part in ["`simulation.density_s`", "20 bytes", "simulation.density_scale = VALUE"] {
+            assert!(cut.contains(part), "{part}: {cut}");
+        }
+        assert_eq!(string(key, text), Order::of(text));
+        assert_eq!(Order::of_message(&command(1, key, "0.5")), Some(Order::of(text)));
     }
 }

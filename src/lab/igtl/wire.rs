@@ -147,6 +147,11 @@ impl<const N: usize> Label<N> {
         Self(bytes)
     }
 
+    /// Most bytes of a text in the field.
+    pub fn room(&self) -> usize {
+        N
+    }
+
     /// The text before the first zero.
     pub fn text(&self) -> Cow<'_, str> {
         let end = self.0.iter().position(|&b| b == 0).unwrap_or(N);

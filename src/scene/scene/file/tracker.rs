@@ -44,10 +44,13 @@ pub(super) fn build(document: &Document<'_>, stated: &Stated) -> Result<Tracker,
         return Err(document.fail(
             "tracker.device",
             format!("`{device}` has {} bytes", device.len()),
-            format!(
-                "names have 1 to {NAME} bytes in OpenIGTLink, which cuts longer ones: give what \
-                 arrives"
-            ),
+            match device.is_empty() {
+                true => "give the name that arrives, or leave `device` out for any".to_owned(),
+                false => format!(
+                    "names have at most {NAME} bytes in OpenIGTLink, which cuts longer ones: give what arrives, `{}`",
+                    &device[..device.floor_char_boundary(NAME)]
+                ),
+            },
         ));
     }
     let place = |name: &str, default: DAffine3| match stated.has(name) {
