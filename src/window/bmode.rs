@@ -20,11 +20,6 @@ const UNIT: f32 = 12.0;
 const STATE: f32 = 104.0;
 /// Distance of the ruler from the image, points.
 const RULER: f32 = 12.0;
-/// Says what is being done while there is no picture yet.
-pub(super) fn prepare(ui: &Ui, preparing: &str) {
-    let (area, font) = (ui.max_rect(), FontId::proportional(16.0));
-    ui.painter_at(area).text(area.center(), Align2::CENTER_CENTER, preparing, font, style::FAINT);
-}
 
 /// Draws everything around a picture in `area`; `held`: it is held beside the one that goes on.
 pub(super) fn show(

@@ -267,13 +267,7 @@ fn images(
     let Seen { frame, now, .. } = seen;
     let [room, beside] = state.dual.rooms(ui.max_rect());
     let held = state.dual.show(ui, beside, false, model, &state.framing);
-    let place = match frame {
-        Some(frame) => bmode::show(ui, room, frame, false, model, &state.framing),
-        None => {
-            bmode::prepare(ui, state.preparing);
-            None
-        }
-    };
+    let place = frame.and_then(|frame| bmode::show(ui, room, frame, false, model, &state.framing));
     let listens = !state.has_dialog() && !state.common.fills;
     let sheet = &mut model.sheet;
     let kind = model.settings.imaging.exam;
@@ -312,7 +306,7 @@ fn images(
     if let Some(fault) = spectrum::fault(model) {
         notice::badge(ui, "no spectra", "Spectra cannot be made:", &fault);
     }
-    if state.prepares && frame.is_some() {
+    if state.prepares {
         notice::preparing(ui, state.preparing);
     }
     notice::show(ui, &mut state.common.inputs);

@@ -2,7 +2,10 @@
 
 use std::time::{Duration, Instant};
 
-use egui::{Align2, Area, Color32, FontId, Frame, Id, Rect, RichText, ScrollArea, Sense, Ui, vec2};
+use egui::{
+    Align2, Area, Color32, FontId, Frame, Id, LayerId, Order, Rect, RichText, ScrollArea, Sense,
+    Ui, vec2,
+};
 
 use super::inputs::Inputs;
 use super::model::{Model, age};
@@ -42,9 +45,10 @@ pub(super) fn show(ui: &Ui, inputs: &mut Inputs) {
     }
 }
 
-/// Draws the work that the next image waits for.
+/// Draws the work that the next image waits for, over the gallery, which stands in the middle at the first start.
 pub(super) fn preparing(ui: &Ui, what: &str) {
-    let (painter, area) = (ui.painter(), ui.max_rect());
+    let painter = ui.ctx().layer_painter(LayerId::new(Order::Foreground, Id::new("preparing")));
+    let area = ui.max_rect();
     let words = painter.layout_no_wrap(what.to_owned(), FontId::proportional(14.0), style::TEXT);
     let badge =
         Rect::from_center_size(area.center_top() + vec2(0.0, 74.0), words.size() + vec2(20.0, 8.0));
@@ -102,4 +106,44 @@ pub(super) fn warnings(ctx: &egui::Context, common: &mut Common) {
             }
         });
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use egui::{CentralPanel, Context, RawInput, Shape, Window};
+
+    use super::*;
+
+    /// Number of the shape with this text, in the order in which they are drawn, and where it lies.
+    fn text(shapes: &[egui::epaint::ClippedShape], wanted: &str) -> Option<(usize, Rect)> {
+        shapes.iter().enumerate().find_map(|(n, clipped)| match &clipped.shape {
+            Shape::Text(text) if text.galley.text() == wanted => {
+                Some((n, text.visual_bounding_rect()))
+            }
+            _ => None,
+        })
+    }
+
+    #[test]
+    fn what_the_first_image_waits_for_is_read_over_the_gallery() {
+        let context = Context::default();
+        let screen = Rect::from_min_size(egui::Pos2::ZERO, vec2(640.0, 400.0));
+        let mut shapes = Vec::new();
+        // Windows are measured in the first pass.
+        for _ in 0..3 {
+            let input = RawInput { screen_rect: Some(screen), ..RawInput::default() };
+            let drawn = context.run_ui(input, |ui| {
+                CentralPanel::default().show(ui, |ui| preparing(ui, "compiling"));
+                let middle = Window::new("gallery").anchor(Align2::CENTER_CENTER, [0.0, 0.0]);
+                middle.show(ui.ctx(), |ui| {
+                    ui.allocate_space(vec2(600.0, 340.0));
+                    ui.label("scenes");
+                });
+            });
+            shapes = drawn.shapes;
+        }
+        let (above, badge) = text(&shapes, "compiling").expect("it is drawn");
+        let (below, _) = text(&shapes, "scenes").expect("the gallery is drawn");
+        assert!(above > below && screen.contains_rect(badge), "{above} {below} {badge}");
+    }
 }
