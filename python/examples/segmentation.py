@@ -16,7 +16,7 @@ import insonify
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("scene")
+    parser.add_argument("scene", nargs="?", default="abdomen", help="a file, or a scene that ships by its name")
     parser.add_argument("-o", "--output", default="segmented")
     parser.add_argument("--height", type=int, default=400, help="of the image, pixels")
     args = parser.parse_args()

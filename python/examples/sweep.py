@@ -17,7 +17,7 @@ import insonify
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("scene")
+    parser.add_argument("scene", nargs="?", default="abdomen", help="a file, or a scene that ships by its name")
     parser.add_argument("-o", "--output", default="sweep")
     parser.add_argument("--frames", type=int, default=40)
     parser.add_argument("--way", type=float, default=60.0, help="mm from the first to the last frame")

@@ -37,13 +37,14 @@ from ._insonify import Frame, InsonifyError, Scene, SceneError, devices  # noqa:
 from .datasets import make_dataset  # noqa: E402
 from .files import save  # noqa: E402
 from .importing import import_labels  # noqa: E402
-from .simulator import Frames, Simulator  # noqa: E402
+from .simulator import Frames, LoopFrame, Simulator  # noqa: E402
 
 __version__ = _insonify.__version__
 __all__ = [
     "Frame",
     "Frames",
     "InsonifyError",
+    "LoopFrame",
     "Scene",
     "SceneError",
     "Simulator",

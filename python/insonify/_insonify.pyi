@@ -62,6 +62,22 @@ def save(
 ) -> None:
     """As insonify.save, which gathers these facts of frames."""
 
+def png(image: NDArray[np.uint8], pixel: float) -> bytes:
+    """The PNG file of an image [H, W] whose pixels are `pixel` mm wide."""
+
+def write(path: str | PathLike[str], bytes: bytes) -> None:
+    """Writes the bytes as a file, whole or not at all."""
+
+def save_film(
+    path: str | PathLike[str],
+    about: str,
+    probe: dict[str, Any],
+    extent: tuple[float, float, float, float],
+    images: NDArray[np.uint8],
+    ends: Sequence[float],
+) -> None:
+    """As insonify.save of a loop: images [N, H, W], each shown until its end, s from the beginning."""
+
 def import_labels(
     voxels: NDArray[Any],
     size: list[int],
@@ -243,6 +259,8 @@ class Frame:
     @property
     def sampling_frequency(self) -> float:
         """Rate of the samples of `rf`, MHz."""
+    def save(self, path: str | PathLike[str]) -> None:
+        """Writes the frame as a file, as insonify.save does: `frame.save("image.png")`."""
     def _repr_png_(self) -> bytes:
         """The image as PNG, for notebooks."""
 

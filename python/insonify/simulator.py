@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import operator
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from os import PathLike
+from typing import TYPE_CHECKING, Any, SupportsIndex, overload
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from . import _insonify
 
@@ -21,14 +24,8 @@ PATIENCE = 0.2
 
 
 @dataclass(repr=False, eq=False)
-class Frames:
-    """Frames of a loop: arrays of N, one for each frame.
-
-    bmode: uint8 [N, H, W]; sector: bool [H, W], true inside it. pose: float64 [N, 4, 4], world from probe, mm. What else
-    was wanted stands under its name: iq complex64 [N, L, K], envelope, log and rf float32 [N, L, K] (rf with more samples
-    to a line). labels is a dictionary of such arrays, legend what their numbers mean; probe are the probe's settings by
-    their keys. Two are equal if their images and arrays are.
-    """
+class _Arrays:
+    """What frames of a loop have, one or all of them."""
 
     bmode: np.ndarray
     pose: np.ndarray
@@ -38,17 +35,13 @@ class Frames:
     labels: dict[str, np.ndarray] = field(default_factory=dict)
     legend: dict[str, Any] = field(default_factory=dict)
     probe: dict[str, Any] = field(default_factory=dict)
-
-    def __len__(self) -> int:
-        return len(self.bmode)
-
-    def __repr__(self) -> str:
-        count, height, width = self.bmode.shape
-        had = ", ".join(["bmode", *self.others, *(["labels"] if self.labels else [])])
-        return f"<insonify.Frames {count} of {width} x {height}: {had}>"
+    extent: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    sampling_frequency: float = 0.0
+    timings: dict[str, Any] = field(default_factory=dict)
+    took: Any = 0.0
 
     def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Frames):
+        if not isinstance(other, type(self)):
             return NotImplemented
         mine, others = ({"bmode": f.bmode, "pose": f.pose, **f.others, **f.labels} for f in (self, other))
         alike = mine.keys() == others.keys() and self.probe == other.probe
@@ -57,27 +50,90 @@ class Frames:
     def _other(self, name: str) -> np.ndarray:
         if name in self.others:
             return self.others[name]
-        raise AttributeError(f"these frames have no {name}; name it in frames(want=...)")
+        raise AttributeError(f"{self!r} has no {name}; name it in frames(want=...)")
+
+    def _had(self) -> str:
+        return ", ".join(["bmode", *self.others, *(["labels"] if self.labels else [])])
+
+    def save(self, path: str | PathLike[str], *, times: ArrayLike | None = None) -> None:
+        """Writes it as a file, as insonify.save does: `loop.save("loop.gif")`, `loop[0].save("image.png")`."""
+        from .files import save
+
+        save(path, self, times=times)  # type: ignore[arg-type]
 
     @property
     def iq(self) -> np.ndarray:
-        """Complex baseband before time-gain compensation, complex64 [N, L, K]."""
+        """Complex baseband before time-gain compensation, complex64 [L, K], of a loop [N, L, K]."""
         return self._other("iq")
 
     @property
     def envelope(self) -> np.ndarray:
-        """Envelope after time-gain compensation, float32 [N, L, K]."""
+        """Envelope after time-gain compensation, float32 [L, K], of a loop [N, L, K]."""
         return self._other("envelope")
 
     @property
     def log(self) -> np.ndarray:
-        """Log-compressed envelope, 0 black to 1 white, float32 [N, L, K]."""
+        """Log-compressed envelope, 0 black to 1 white, float32 [L, K], of a loop [N, L, K]."""
         return self._other("log")
 
     @property
     def rf(self) -> np.ndarray:
-        """Radio-frequency lines before time-gain compensation, float32 [N, L, n K], n samples to each axial one."""
+        """Radio-frequency lines before time-gain compensation, float32 [L, n K], of a loop [N, L, n K]; n samples to each
+        axial one."""
         return self._other("rf")
+
+
+class LoopFrame(_Arrays):
+    """A frame of a loop, which has what a `Frame` has: bmode [H, W], pose [4, 4], and under its name what was wanted of
+    the loop. The arrays are parts of the loop's."""
+
+    def __repr__(self) -> str:
+        height, width = self.bmode.shape
+        return f"<insonify.LoopFrame {width} x {height}: {self._had()}>"
+
+    def _repr_png_(self) -> bytes:
+        return _insonify.png(np.ascontiguousarray(self.bmode), float(self.axes["x"][1] - self.axes["x"][0]))
+
+
+class Frames(_Arrays):
+    """Frames of a loop: arrays of N, one for each frame. `loop[i]` and iteration give one at a time, `loop[i:j]` a loop of
+    some.
+
+    bmode: uint8 [N, H, W]; sector: bool [H, W], true inside it. pose: float64 [N, 4, 4], world from probe, mm. What else
+    was wanted stands under its name: iq complex64 [N, L, K], envelope, log and rf float32 [N, L, K] (rf with more samples
+    to a line). labels is a dictionary of such arrays, legend what their numbers mean; probe are the probe's settings by
+    their keys. axes, extent and sampling_frequency are those of each frame; timings has milliseconds on the device by
+    stage [N], took those by the clock [N]. Two are equal if their images and arrays are.
+    """
+
+    def __len__(self) -> int:
+        return len(self.bmode)
+
+    @overload
+    def __getitem__(self, index: SupportsIndex) -> LoopFrame: ...
+    @overload
+    def __getitem__(self, index: slice) -> Frames: ...
+    def __getitem__(self, index: SupportsIndex | slice) -> LoopFrame | Frames:
+        kind: type[LoopFrame] | type[Frames] = Frames
+        if not isinstance(index, slice):
+            kind, number = LoopFrame, operator.index(index)
+            if not -len(self) <= number < len(self):
+                raise IndexError(f"frame {number} of {len(self)}")
+            index = number
+        own = {name: values[index] for name, values in self.others.items()}
+        labels = {name: values[index] for name, values in self.labels.items()}
+        timings = {name: values[index] for name, values in self.timings.items()}
+        return kind(
+            self.bmode[index], self.pose[index], self.axes, self.sector, own, labels, self.legend, self.probe,
+            self.extent, self.sampling_frequency, timings, self.took[index],
+        )
+
+    def __iter__(self) -> Iterator[LoopFrame]:
+        return (self[i] for i in range(len(self)))
+
+    def __repr__(self) -> str:
+        count, height, width = self.bmode.shape
+        return f"<insonify.Frames {count} of {width} x {height}: {self._had()}>"
 
 
 class Simulator(_insonify.Simulator):
@@ -118,10 +174,9 @@ class Simulator(_insonify.Simulator):
         wanted: list[Want] = [want] if isinstance(want, str) else list(want)  # type: ignore[list-item]
         rows: dict[str, np.ndarray] = {}
         labels: dict[str, np.ndarray] = {}
-        axes: dict[str, np.ndarray] = {}
         legend: dict[str, Any] = {}
-        probe: dict[str, Any] = {}
-        sector: np.ndarray = np.empty(0, bool)
+        first: _insonify.Frame | None = None
+        took, timings = np.zeros(count), dict[str, np.ndarray]()
         counted = _counted(count, progress)
         start, at_once = 0, 1
         while start < count:
@@ -137,9 +192,10 @@ class Simulator(_insonify.Simulator):
             )
             for frame in made:
                 i = next(counted)
-                axes = axes or frame.axes
-                probe = probe or frame.probe
-                sector = sector if sector.size else frame.sector
+                first = first or frame
+                took[i] = frame.took
+                for stage, spent in frame.timings.items():
+                    timings.setdefault(stage, np.zeros(count))[i] = spent
                 for name in ("bmode", "pose", *wanted):
                     if name != "labels":
                         _put(rows, name, i, count, getattr(frame, name))
@@ -152,7 +208,11 @@ class Simulator(_insonify.Simulator):
             at_once = max(1, min(AT_ONCE, 2 * at_once, int(PATIENCE / max(each, 1e-6))))
             start = end
         next(counted, None)
-        return Frames(rows.pop("bmode"), rows.pop("pose"), axes, sector, rows, labels, legend, probe)
+        assert first is not None
+        return Frames(
+            rows.pop("bmode"), rows.pop("pose"), first.axes, first.sector, rows, labels, legend, first.probe,
+            first.extent, first.sampling_frequency, timings, took,
+        )
 
 
 def _end(start: int, most: int, times: Sequence[float] | None, labels: bool) -> int:

@@ -1,5 +1,6 @@
 //! Frames of Python: an image and what it was made of.
 
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use glam::{DAffine3, DVec3};
@@ -303,6 +304,12 @@ impl Frame {
     fn sampling_frequency(&self) -> f64 {
         let probe = &self.picture.probe;
         rf::oversampling(probe) as f64 * probe.speed / (2.0 * probe.sample_pitch())
+    }
+
+    /// Writes the frame as a file, as insonify.save does: `frame.save("image.png")`.
+    fn save(slf: &Bound<'_, Self>, path: PathBuf) -> PyResult<()> {
+        slf.py().import("insonify.files")?.call_method1("save", (path, slf))?;
+        Ok(())
     }
 
     /// The image as PNG, for notebooks.

@@ -14,6 +14,7 @@ mod importing;
 mod kept_frame;
 mod levels;
 mod pickle;
+mod pictures;
 mod process;
 mod running;
 mod save;
@@ -82,6 +83,9 @@ fn _insonify(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(kept_frame::again_frame, module)?)?;
     module.add_function(wrap_pyfunction!(dataset::make_dataset, module)?)?;
     module.add_function(wrap_pyfunction!(save::save, module)?)?;
+    module.add_function(wrap_pyfunction!(pictures::png, module)?)?;
+    module.add_function(wrap_pyfunction!(pictures::write, module)?)?;
+    module.add_function(wrap_pyfunction!(pictures::save_film, module)?)?;
     module.add_function(wrap_pyfunction!(importing::import_labels, module)?)?;
     module.add_function(wrap_pyfunction!(devices, module)?)?;
     module.add_function(wrap_pyfunction!(set_compiler, module)?)?;

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use insonify::scene::file::quoted;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList};
+use pyo3::types::{PyDict, PyList, PyString};
 
 use crate::arrays;
 use crate::state::Given;
@@ -54,7 +54,10 @@ impl Written {
             for (name, table) in by_name {
                 let table =
                     table.cast_into::<PyDict>().map_err(|e| wrong(e.into_inner()))?.copy()?;
-                table.set_item("name", name)?;
+                // Wires have none: theirs is for whoever reads the program.
+                if key != "wire" {
+                    table.set_item("name", name)?;
+                }
                 out.push(table);
             }
         } else {
@@ -63,20 +66,16 @@ impl Written {
                 out.push(table.cast_into::<PyDict>().map_err(|e| wrong(e.into_inner()))?.copy()?);
             }
         }
-        if key == "mesh" {
-            out.iter().try_for_each(|table| self.surface(table))?;
+        match key {
+            "mesh" => out.iter().try_for_each(|table| self.surface(table))?,
+            "wire" => return Ok(out.iter().map(points).collect::<PyResult<Vec<_>>>()?.concat()),
+            _ => {}
         }
         Ok(out)
     }
 
     fn surface(&mut self, table: &Bound<'_, PyDict>) -> PyResult<()> {
-        let take = |key: &str| {
-            let value = table.get_item(key)?;
-            if value.is_some() {
-                table.del_item(key)?;
-            }
-            PyResult::Ok(value)
-        };
+        let take = |key: &str| take(table, key);
         let (vertices, triangles) = match (take("vertices")?, take("triangles")?) {
             (None, None) => return Ok(()),
             (Some(vertices), Some(triangles)) => (vertices, triangles),
@@ -102,4 +101,54 @@ impl Written {
         self.given.insert(name, Arc::new(given));
         Ok(())
     }
+}
+
+/// The value of a key, which is taken out of its table.
+fn take<'py>(table: &Bound<'py, PyDict>, key: &str) -> PyResult<Option<Bound<'py, PyAny>>> {
+    let value = table.get_item(key)?;
+    if value.is_some() {
+        table.del_item(key)?;
+    }
+    Ok(value)
+}
+
+/// The tables of a wire: its own, or one for each of its `points` [N, 3], of one `amplitude` or of N of them.
+fn points<'py>(table: &Bound<'py, PyDict>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+    let Some(points) = take(table, "points")? else { return Ok(vec![table.clone()]) };
+    for key in ["from", "to", "spacing"] {
+        if table.contains(key)? {
+            return Err(PyValueError::new_err(format!(
+                "a wire has `{key}` beside `points`: a line has two ends, points have places"
+            )));
+        }
+    }
+    let points = arrays::reals(&points, "points", &[None, Some(3)])?;
+    let points = points.as_slice()?.as_chunks::<3>().0;
+    let amplitude = take(table, "amplitude")?;
+    let levels = match amplitude
+        .as_ref()
+        .map(|given| arrays::reals(given, "amplitude", &[Some(points.len())]))
+    {
+        Some(Ok(levels)) => Some(levels.as_slice()?.to_vec()),
+        // One for all: a number, or a text with its unit.
+        Some(Err(error)) => match amplitude
+            .as_ref()
+            .is_some_and(|given| given.len().is_err() || given.is_instance_of::<PyString>())
+        {
+            true => None,
+            false => return Err(error),
+        },
+        None => None,
+    };
+    let point = |(i, place): (usize, &[f64; 3])| {
+        let one = table.copy()?;
+        one.set_item("from", *place)?;
+        match (&levels, &amplitude) {
+            (Some(levels), _) => one.set_item("amplitude", levels[i])?,
+            (None, Some(level)) => one.set_item("amplitude", level)?,
+            (None, None) => {}
+        }
+        Ok(one)
+    };
+    points.iter().enumerate().map(point).collect()
 }

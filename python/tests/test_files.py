@@ -80,9 +80,53 @@ def test_the_probe_of_a_frame_makes_the_same_probe(scene, kind, tmp_path):
         assert np.isclose(scan["origin/distance"][()].item() * 1e3, kind.get("radius", 0))
 
 
+def test_a_frame_is_written_as_a_picture(loop, simulator, tmp_path):
+    import struct
+
+    from matplotlib import pyplot
+
+    for name, frame in [("a", simulator.frame()), ("b", loop[1]), ("c", loop[1:2])]:
+        frame.save(tmp_path / f"{name}.png")
+        image = frame.bmode if frame.bmode.ndim == 2 else frame.bmode[0]
+        assert np.array_equal((255 * pyplot.imread(tmp_path / f"{name}.png")).round().astype(np.uint8), image)
+        bytes_ = (tmp_path / f"{name}.png").read_bytes()
+        per_metre = struct.unpack(">I", bytes_[bytes_.index(b"pHYs") + 4 :][:4])[0]
+        assert np.isclose(1000 / per_metre, np.diff(frame.axes["x"])[0], rtol=1e-4)
+        assert name == "c" or bytes_ == frame._repr_png_()
+
+
+def test_a_loop_is_written_as_a_film_and_as_arrays(loop, simulator, tmp_path):
+    loop.save(tmp_path / "loop.gif", times=[1, 1.5, 3])
+    film = (tmp_path / "loop.gif").read_bytes()
+    # Graphic control extensions, in hundredths of a second; the last frame is shown as long as one on the average.
+    parts = film.split(b"\x21\xf9\x04")[1:]
+    assert film[:6] == b"GIF89a" and [int.from_bytes(part[1:3], "little") for part in parts] == [50, 150, 100]
+    loop.save(tmp_path / "loop.dcm")
+    assert (tmp_path / "loop.dcm").read_bytes()[128:132] == b"DICM" and loop.bmode.tobytes() in (tmp_path / "loop.dcm").read_bytes()
+    for name, frames in [("loop", loop), ("frame", loop[2]), ("own", simulator.frame(want=["iq"]))]:
+        frames.save(tmp_path / f"{name}.npz")
+        with np.load(tmp_path / f"{name}.npz") as arrays:
+            every = (lambda array: array) if name == "loop" else (lambda array: array[None])
+            assert np.array_equal(arrays["bmode"], every(frames.bmode)) and np.array_equal(arrays["iq"], every(frames.iq))
+            assert np.array_equal(arrays["pose"], every(frames.pose)) and np.array_equal(arrays["x"], frames.axes["x"])
+            assert len(arrays["time"]) == len(arrays["bmode"])
+            if name != "own":
+                assert np.array_equal(arrays["pixel_tissue"], every(frames.labels["pixel_tissue"]))
+    insonify.save(tmp_path / "one.hdf5", loop[1])
+    with h5py.File(tmp_path / "one.hdf5") as file:
+        assert (file["tracks/track_0/data/image/values"][0] == loop.bmode[1]).all()
+    assert not [path for path in tmp_path.iterdir() if path.name.startswith(".")]
+
+
 def test_mistakes_are_told(loop, simulator, tmp_path):
     with pytest.raises(ValueError, match=r"\.uff \(USTB\) or \.hdf5 \(zea\)"):
+        insonify.save(tmp_path / "loop.tiff", loop)
+    with pytest.raises(ValueError, match=r"one of the 3 frames, as loop\[0\]"):
         insonify.save(tmp_path / "loop.png", loop)
+    with pytest.raises(ValueError, match="times do not increase"):
+        insonify.save(tmp_path / "loop.gif", loop, times=[0, 2, 1])
+    with pytest.raises(OSError, match="none"):
+        insonify.save(tmp_path / "none" / "frame.png", loop[0])
     with pytest.raises(ValueError, match="times do not increase"):
         insonify.save(tmp_path / "loop.uff", loop, times=[0, 0, 1])
     with pytest.raises(ValueError, match="2 times of 3 frames"):

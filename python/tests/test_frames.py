@@ -102,6 +102,36 @@ def test_frames_are_the_single_frames_to_the_bit(simulator):
     assert len(np.unique(loop.iq.reshape(count, -1), axis=0)) == count
 
 
+def test_a_loop_has_frames_by_number_in_turn_and_in_parts(simulator):
+    poses = np.stack([simulator.scene.pose] * 4)
+    poses[:, 0, 3] += np.arange(4)
+    loop = simulator.frames(poses, want=["iq", "labels"])
+    single = simulator.frame(poses[2], number=2, want=["iq", "labels"])
+    third = loop[2]
+    for name in ("bmode", "pose", "iq", "sector"):
+        assert np.array_equal(getattr(third, name), getattr(single, name)), name
+    assert np.array_equal(third.labels["pixel_tissue"], single.labels["pixel_tissue"])
+    assert (third.probe, third.legend, third.extent) == (single.probe, single.legend, single.extent)
+    assert third.sampling_frequency == single.sampling_frequency and third.axes.keys() == single.axes.keys()
+    assert [frame.pose[0, 3] for frame in loop] == list(loop.pose[:, 0, 3])
+    assert loop[-1] == loop[3] and loop[2] != loop[3] and np.shares_memory(third.bmode, loop.bmode)
+    part = loop[1:3]
+    assert isinstance(part, insonify.Frames) and len(part) == 2 and part[1] == third and np.array_equal(part.iq, loop.iq[1:3])
+    # Times: of each frame by the clock and by stage.
+    assert loop.took.shape == (4,) and (loop.took > 0).all() and third.took == loop.took[2]
+    assert loop.timings.keys() == single.timings.keys() and all(ms.shape == (4,) for ms in loop.timings.values())
+    assert third.timings == {stage: ms[2] for stage, ms in loop.timings.items()}
+    assert all(np.array_equal(part.timings[stage], ms[1:3]) for stage, ms in loop.timings.items())
+    with pytest.raises(IndexError, match="frame 4 of 4"):
+        loop[4]
+    with pytest.raises(TypeError):
+        loop["bmode"]
+    with pytest.raises(AttributeError, match="no rf; name it"):
+        third.rf
+    assert repr(third).startswith("<insonify.LoopFrame") and repr(loop).startswith("<insonify.Frames 4 of")
+    assert third._repr_png_()[:8] == b"\x89PNG\r\n\x1a\n"
+
+
 def test_labels_of_frames_are_those_of_single_frames(simulator):
     """Also what has moved: the ball, which is placed anew between two loops, and the probe."""
     poses = np.repeat(np.eye(4)[None], 3, 0)

@@ -1,5 +1,8 @@
 """Scenes: read, made, changed; every mistake is an exception with a place and a remedy."""
 
+import copy
+import pickle
+
 import numpy as np
 import pytest
 from conftest import QUICK, ROOT, ball, sphere
@@ -298,3 +301,47 @@ def test_levels_are_settings_each_cheaper_than_the_one_before():
     assert scene["probe.scanlines"] == 96 and scene["probe.elevation_layers"] == 1
     with pytest.raises(IndexError, match="0 to"):
         scene.level(99)
+
+
+def test_points_are_given_as_arrays(tmp_path):
+    places = np.array([[-3.0, 0, 20], [4, 0, 15], [0, 0, 30]])
+    levels = np.array([-20.0, -26, -14])
+    one_by_one = [{"from": place, "amplitude": level} for place, level in zip(places.tolist(), levels.tolist())]
+    silent = {"tissues": {"silent": {"based_on": "water"}}, "background": "silent"}
+
+    def imaged(wire):
+        with insonify.Simulator(insonify.Scene(wire=wire, **{**QUICK, **silent}), tracer="bvh") as simulator:
+            return simulator.frame().bmode
+
+    def written(wire):
+        insonify.Scene(wire=wire, **QUICK).save(tmp_path / "scene.toml")
+        return (tmp_path / "scene.toml").read_text()
+
+    expected = imaged(one_by_one)
+    assert expected.max() > 60
+    assert np.array_equal(imaged([{"points": places, "amplitude": levels}]), expected)
+    assert written({"cloud": {"points": places.tolist(), "amplitude": levels.tolist()}}) == written(one_by_one)
+    for amplitude in ("-20 dB", -20, -20.0):
+        alike = [{"from": place, "amplitude": amplitude} for place in places.tolist()]
+        assert written([{"points": places, "amplitude": amplitude}]) == written(alike)
+    # Beside lines, and none at all.
+    line = {"from": [0, 0, 10], "to": [5, 0, 10]}
+    assert written([line, {"points": places, "amplitude": levels}]) == written([line, *one_by_one])
+    assert written([line, {"points": np.zeros((0, 3))}]) == written([line])
+    many = insonify.Scene(wire=[{"points": np.random.default_rng(1).uniform(-10, 10, (5000, 3)) + [0, 0, 20]}], **QUICK)
+    assert copy.copy(many) == many and pickle.loads(pickle.dumps(many)) == many
+
+
+@pytest.mark.parametrize(
+    "wire, text",
+    [
+        ({"points": [[0, 0]]}, r"points has the shape \[1, 2\], not \[N, 3\]"),
+        ({"points": [[0, 0, 1]], "amplitude": [1, 2]}, r"amplitude has the shape \[2\], not \[1\]"),
+        ({"points": [[0, 0, 1]], "amplitude": ["3 dB"]}, "amplitude is of dtype"),
+        ({"points": [[0, 0, 1]], "spacing": 1}, "`spacing` beside `points`"),
+        ({"points": [[0, 0, np.nan]]}, "points holds NaN"),
+    ],
+)
+def test_points_that_do_not_fit_are_refused(wire, text):
+    with pytest.raises((ValueError, TypeError), match=text):
+        insonify.Scene(wire=[wire])
