@@ -284,10 +284,15 @@ mod tests {
             let mut keeper = Keeper { all, ..Keeper::default() };
             assert_eq!(keeper.fault(), None);
             keeper.send(draft());
-            keeper.send(draft());
-            // The thread has then done all of it.
-            keeper.forget();
-            let said = keeper.fault().expect("nothing is kept").to_owned();
+            // By the thread that writes.
+            let begun = Instant::now();
+            let said = loop {
+                if let Some(fault) = keeper.fault() {
+                    break fault.to_owned();
+                }
+                assert!(begun.elapsed() < Duration::from_secs(60), "it is not told");
+                thread::sleep(Duration::from_millis(1));
+            };
             let named = said.contains(&below.display().to_string());
             assert!(named == is_named && said.contains(STATE_VARIABLE), "{said}");
             keeper.send(draft());

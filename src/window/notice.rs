@@ -132,7 +132,7 @@ mod tests {
         // Windows are measured in the first pass.
         for _ in 0..3 {
             let input = RawInput { screen_rect: Some(screen), ..RawInput::default() };
-            let drawn = context.run_ui(input, |ui| {
+            let mut drawn = context.run_ui(input, |ui| {
                 CentralPanel::default().show(ui, |ui| preparing(ui, "compiling"));
                 let middle = Window::new("gallery").anchor(Align2::CENTER_CENTER, [0.0, 0.0]);
                 middle.show(ui.ctx(), |ui| {
@@ -140,7 +140,8 @@ mod tests {
                     ui.label("scenes");
                 });
             });
-            shapes = drawn.shapes;
+            drawn.textures_delta.clear();
+            shapes = std::mem::take(&mut drawn.shapes);
         }
         let (above, badge) = text(&shapes, "compiling").expect("it is drawn");
         let (below, _) = text(&shapes, "scenes").expect("the gallery is drawn");
