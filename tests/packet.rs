@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use insonify::doppler::{make_packet, nyquist};
 use insonify::gpu::test_device;
-use insonify::scene::flow::{CentreLine, Course, Flow, FlowShape};
+use insonify::scene::flow::{CentreLine, Course, Flow, FlowShape, Vessel};
 use insonify::scene::{Scene, shapes};
 use insonify::sim::shaders::Library;
 use insonify::sim::{ColourMode, Packet, Simulator, Tracer};
@@ -26,7 +26,7 @@ fn scene(paths: u32) -> Scene {
     add_body(&mut scene, shapes::cylinder(4.0, 80.0, 64), tissue(1.56, 1.65, 0.2), at);
     let ends = [-40.0, 40.0].map(|z| DVec3::Z * z).to_vec();
     let line = CentreLine::new(ends, vec![4.0; 2]).expect("a line");
-    let shape = FlowShape::Tube { line, exponent: 2.0 };
+    let shape = FlowShape::Tube(Vessel::tube(line, 2.0));
     scene.flows = vec![Flow::new("blood".into(), 0, shape, 300.0, Course::Steady)];
     scene
 }

@@ -6,7 +6,7 @@ use glam::{DAffine3, DVec3};
 use insonify::doppler::gate::record;
 use insonify::doppler::spectrum::{Analyser, Spectrogram};
 use insonify::gpu::test_device;
-use insonify::scene::flow::{CentreLine, Course, Flow, FlowShape};
+use insonify::scene::flow::{CentreLine, Course, Flow, FlowShape, Vessel};
 use insonify::scene::{Scene, shapes};
 use insonify::settings::{Spectral, Wave};
 use insonify::sim::shaders::Library;
@@ -169,7 +169,7 @@ fn the_spectrum_of_a_whole_lumen_is_flat_for_a_parabola() {
         add_body(&mut scene, mesh, tissue(1.54, 1.63, 0.0), at);
         let ends = [12.0, -12.0].map(|z| DVec3::Z * z).to_vec();
         let line = CentreLine::new(ends, vec![radius; 2]).expect("a line");
-        let shape = FlowShape::Tube { line, exponent };
+        let shape = FlowShape::Tube(Vessel::tube(line, exponent));
         scene.flows = vec![Flow::new("blood".into(), 0, shape, speed, Course::Steady)];
         scene.spectral = Spectral {
             prf: 3000.0,

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 use std::rc::Rc;
 
 use glam::{DAffine3, DVec3};
-use insonify::scene::flow::{CentreLine, Course, Flow, FlowShape};
+use insonify::scene::flow::{CentreLine, Course, Flow, FlowShape, Vessel};
 use insonify::scene::{Scene, shapes};
 
 use crate::physics::check::{Bench, Check, Outcome, Physics};
@@ -196,7 +196,7 @@ fn vessel(radius: f64, angle: f64, speed: f64, exponent: f64) -> Scene {
     add_body(&mut scene, mesh, tissue(1.54, 1.63, 0.0), at);
     let ends = [-60.0, 60.0].map(|z| DVec3::Z * z).to_vec();
     let line = CentreLine::new(ends, vec![radius; 2]).expect("a line");
-    let shape = FlowShape::Tube { line, exponent };
+    let shape = FlowShape::Tube(Vessel::tube(line, exponent));
     scene.flows = vec![Flow::new("blood".into(), 0, shape, speed, Course::Steady)];
     scene
 }
@@ -214,7 +214,7 @@ fn loudness(bench: &Bench, physics: Physics) -> Outcome {
     let (name, render) = &bench.renderers[1];
     let angle = 60.0_f64.to_radians();
     let mut scene = vessel(WIDE, angle, 400.0, 2.0);
-    let lifetime = scene.flows[0].lifetime(&scene.instances[0].world_from_object);
+    let lifetime = scene.flows[0].lifetime(&scene.instances[0].world_from_object, |_| true);
     let lines = BESIDE..LINES - BESIDE;
     let mut measure = |flows: Vec<Flow>, lives: f64| {
         scene.flows = flows;

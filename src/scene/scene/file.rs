@@ -17,6 +17,7 @@ mod flow;
 mod fusion;
 mod graph;
 mod known;
+mod lines;
 mod motion;
 mod nodes;
 mod paper;

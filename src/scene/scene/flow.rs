@@ -7,11 +7,13 @@
 
 mod course;
 mod line;
+mod vessel;
 
 use glam::{DAffine3, DMat3, DVec3};
 
 pub use course::Course;
 pub use line::CentreLine;
+pub use vessel::{Apart, Tube, Vessel};
 
 /// Largest change of the way per mm across it, at the end of a generation's life: scatterers are found by an affine map
 /// with a limit on its stretch (`docs/kernels.md`, scatter), which a shear by this much respects.
@@ -47,13 +49,11 @@ pub enum FlowShape {
         /// Unit vector.
         DVec3,
     ),
-    /// Along a tube: fastest on its centre line, at rest on its wall.
-    Tube {
-        /// The centre line, with the tube's radius.
-        line: CentreLine,
-        /// Exponent K of the profile 1 - (r/R)^K: 2 is Poiseuille's parabola, more is flatter.
-        exponent: f64,
-    },
+    /// Along a tube and its branches: fastest on their centre lines, at rest on their walls.
+    Tube(
+        /// The lines.
+        Vessel,
+    ),
 }
 
 /// Scatterers of blood that were set out at the same time.
@@ -101,12 +101,14 @@ impl Flow {
         self.speed * self.course.at(self.seconds) * interval
     }
 
-    /// Life of a generation in a mesh that `placed` brings into the world, s.
-    pub fn lifetime(&self, placed: &DAffine3) -> f64 {
+    /// Life of a generation in a mesh that `placed` brings into the world, s. `within` holds the places of the mesh, in its
+    /// own space: what flows faster elsewhere does not count.
+    pub fn lifetime(&self, placed: &DAffine3, within: impl Fn(DVec3) -> bool) -> f64 {
+        let (speed, shear) = self.shape.extremes(placed, within);
         let fastest = self.speed.abs() * self.course.largest();
-        let shear = MOST_SHEAR / (fastest * self.shape.shear(placed));
-        let way = MOST_WAY / fastest;
-        (2.0 * shear.min(way)).min(LONGEST_LIFE)
+        let sheared = MOST_SHEAR / (fastest * shear);
+        let carried = MOST_WAY / (fastest * speed);
+        (2.0 * sheared.min(carried)).min(LONGEST_LIFE)
     }
 
     /// The two generations of `after` seconds from now, of which each lives for `lifetime`.
@@ -131,36 +133,28 @@ impl FlowShape {
     pub fn velocity(&self, place: DVec3, placed: &DMat3) -> DVec3 {
         match self {
             Self::Uniform(direction) => (*placed * *direction).normalize_or_zero(),
-            Self::Tube { line, exponent } => {
-                let near = line.nearest(place);
-                let share = 1.0 - (near.distance / near.radius).powf(*exponent);
-                // What flows through a narrower part flows faster.
-                let narrower = (line.radius() / near.radius).powi(2);
-                share.max(0.0) * narrower * (*placed * near.along).normalize_or_zero()
-            }
+            Self::Tube(vessel) => vessel.velocity(place, placed),
         }
     }
 
-    /// Largest change of the velocity over the speed per mm, in a mesh that `placed` brings into the world.
-    pub fn shear(&self, placed: &DAffine3) -> f64 {
+    /// Largest velocity over the speed, and its largest change per mm, in a mesh that `placed` brings into the world, where
+    /// `within` holds the places of the mesh's own space.
+    fn extremes(&self, placed: &DAffine3, within: impl Fn(DVec3) -> bool) -> (f64, f64) {
         match self {
-            Self::Uniform(_) => 0.0,
-            Self::Tube { line, exponent } => {
-                let thinnest = thinnest(placed);
-                let at =
-                    |radius: f64| exponent / (radius * thinnest) * (line.radius() / radius).powi(2);
-                line.radii().map(at).fold(0.0, f64::max)
+            Self::Uniform(_) => (1.0, 0.0),
+            Self::Tube(vessel) => {
+                let (speed, shear) = vessel.extremes(within);
+                (speed, shear / thinnest(placed))
             }
         }
     }
 
-    /// The narrowest radius, mm, in the space to which `placed` brings the mesh; none of a shape that is alike everywhere.
-    pub fn narrowest(&self, placed: &DAffine3) -> Option<f64> {
+    /// The narrowest radius, mm, in the space to which `placed` brings the mesh, where `within` holds the places of the mesh's
+    /// own space; none of a shape that is alike everywhere.
+    pub fn narrowest(&self, placed: &DAffine3, within: impl Fn(DVec3) -> bool) -> Option<f64> {
         match self {
             Self::Uniform(_) => None,
-            Self::Tube { line, .. } => {
-                Some(thinnest(placed) * line.radii().fold(f64::INFINITY, f64::min))
-            }
+            Self::Tube(vessel) => Some(thinnest(placed) * vessel.narrowest(within)),
         }
     }
 }
@@ -178,7 +172,7 @@ mod tests {
 
     fn tube(exponent: f64, speed: f64, course: Course) -> Flow {
         let line = CentreLine::new(vec![DVec3::ZERO, DVec3::Z * 40.0], vec![3.0; 2]);
-        let shape = FlowShape::Tube { line: line.expect("two points"), exponent };
+        let shape = FlowShape::Tube(Vessel::tube(line.expect("two points"), exponent));
         Flow::new("vessel".into(), 0, shape, speed, course)
     }
 
@@ -231,7 +225,7 @@ mod tests {
     #[test]
     fn generations_are_as_loud_together_at_every_time_and_are_renewed_in_silence() {
         let mut flow = tube(2.0, 800.0, pulse());
-        let lifetime = flow.lifetime(&DAffine3::IDENTITY);
+        let lifetime = flow.lifetime(&DAffine3::IDENTITY, |_| true);
         // The wall's shear is 2 * 800 / 3 a second.
         assert!((lifetime - 2.0 * MOST_SHEAR * 3.0 / 1600.0).abs() < 1e-12, "{lifetime}");
         let mut before = flow.generations(lifetime, 0.0);

@@ -8,11 +8,12 @@ use super::columns::{ColumnFile, Columns, text};
 use super::document::Document;
 use super::error::SceneError;
 use super::fusion;
+use super::lines::{self, EXPONENTS, Given};
 use super::motion::PERIOD;
 use super::placing::PLACE;
 use super::table::{Stated, Table};
 use crate::scene::animation::Clock;
-use crate::scene::flow::{CentreLine, Course, Flow, FlowShape};
+use crate::scene::flow::{Apart, CentreLine, Course, Flow, FlowShape, Tube, Vessel};
 use crate::scene::{Instance, Mesh, Scene, Warning};
 use crate::settings::units::{LENGTH, VELOCITY};
 use crate::settings::{Form, ScatterMode, TextureSpace, group, words};
@@ -39,13 +40,14 @@ group! {
         mesh: String = String::new(), Facts::of(Form::Text).required();
         /// Shape of the flow: along a tube, fastest in its middle; or alike everywhere.
         kind: FlowKind = FlowKind::Tube, Facts::word::<FlowKind>();
-        /// Speed where it is fastest: in the middle of the tube, at the height of the waveform. Below zero: the other way.
+        /// Speed at the height of the waveform, in the middle of the tube where it begins; of a uniform flow everywhere. Below
+        /// zero: the other way.
         speed: f64 = 0.0, Facts::quantity(&VELOCITY, -FASTEST, FASTEST).required();
         /// Direction, in the mesh's space. Uniform only.
         direction: Option<[f64; 3]> = None, Facts::of(Form::Direction).by_default("required");
-        /// Exponent K of the profile 1 - (r/R)^K: 2 is a parabola (Poiseuille), more is flatter, as at the beginning of
-        /// a vessel. Tube only.
-        exponent: f64 = 2.0, Facts::number(1.0, 50.0);
+        /// Exponent K of the profile 1 - (r/R)^K, where no file says it: 2 is a parabola (Poiseuille), more is flatter, as
+        /// at the beginning of a vessel. Tube only.
+        exponent: f64 = 2.0, Facts::number(EXPONENTS.0, EXPONENTS.1);
     }
 }
 
@@ -57,7 +59,8 @@ group! {
         /// Its end.
         to: Option<[f64; 3]> = None, PLACE.by_default("required without `file`");
         /// Of one that is not straight: a CSV file, relative to the scene file, with columns `x_mm`, `y_mm`, `z_mm` and, if
-        /// wanted, `radius_mm`.
+        /// wanted, `radius_mm`, `exponent` and, where the tube branches, `line`: the number of the line to which the row
+        /// belongs.
         file: Option<String> = None, Facts::of(Form::Text).by_default("straight");
         /// Radius of the tube, where no file says it.
         radius: Option<f64> = None, Facts::quantity(&LENGTH, 1e-2, 1e3).by_default("of the mesh's cross-sections");
@@ -77,9 +80,6 @@ group! {
     }
 }
 
-/// A centre line's columns.
-const LINE: ColumnFile =
-    ColumnFile { name: "centre line", columns: &["x_mm", "y_mm", "z_mm", "radius_mm"] };
 /// A waveform's columns.
 const WAVEFORM: ColumnFile = ColumnFile { name: "waveform", columns: &["time_s", "speed"] };
 
@@ -161,32 +161,83 @@ impl OneFlow<'_> {
                 })?;
                 FlowShape::Uniform(DVec3::from(direction).normalize())
             }
-            FlowKind::Tube => FlowShape::Tube {
-                line: self.line(&scene.meshes[placed.mesh], placed)?,
-                exponent: self.keys.exponent,
-            },
+            FlowKind::Tube => FlowShape::Tube(self.vessel(&scene.meshes[placed.mesh], placed)?),
         };
         Ok(Flow::new(name.clone(), instance, shape, *speed, self.course()?))
     }
 
-    /// The centre line, with radii.
-    fn line(&self, mesh: &Mesh, placed: &Instance) -> Result<CentreLine, SceneError> {
+    /// The centre lines of a tube and its branches.
+    fn vessel(&self, mesh: &Mesh, placed: &Instance) -> Result<Vessel, SceneError> {
         let LineKeys { from, to, file, radius } = &self.stated.get("line.");
-        let (key, points, radii) = match (file, from, to) {
+        let (key, lines) = match (file, from, to) {
             (Some(file), None, None) => {
-                let (points, radii) = self.line_file(file)?;
-                ("line.file", points, radii)
+                let path = self.beside(file);
+                ("line.file", lines::read(&path, &self.text(&path, "line.file")?)?)
             }
             (Some(_), ..) => {
                 let message = "a tube has either a file with its centre line or two ends";
                 return Err(self.fail("line.file", message, "remove `file`, or `from` and `to`"));
             }
-            (None, Some(from), Some(to)) => ("line.from", vec![(*from).into(), (*to).into()], None),
+            (None, Some(from), Some(to)) => {
+                let points = vec![(*from).into(), (*to).into()];
+                ("line.from", vec![Given { points, radii: None, exponents: None }])
+            }
             (None, ..) => {
                 let message = "a tube needs its centre line";
                 let remedy = "add line = { from = [x, y, z], to = [x, y, z] }, or line = { file = \"points.csv\" }";
                 return Err(self.fail("mesh", message, remedy));
             }
+        };
+        self.check_inside(key, &lines, mesh, placed)?;
+        let mut tubes = Vec::new();
+        for Given { points, radii, exponents } in lines {
+            let radii = match (radii, radius) {
+                (Some(radii), None) => radii,
+                (Some(_), Some(_)) => {
+                    let message = "the file of the centre line has radii already";
+                    return Err(self.fail("line.radius", message, "remove it here or there"));
+                }
+                (None, Some(radius)) => vec![*radius; points.len()],
+                (None, None) => self.measured(mesh, &points)?,
+            };
+            let exponents = exponents.unwrap_or_else(|| vec![self.keys.exponent; points.len()]);
+            let line = CentreLine::new(points, radii).ok_or_else(|| {
+                let message = "the centre line has two points at the same place";
+                self.fail(key, message, "give every point once")
+            })?;
+            tubes.push(Tube { line, exponents });
+        }
+        Vessel::new(tubes).map_err(|Apart { line, gap }| {
+            let message = format!(
+                "line {} begins {gap:.1} mm beside the tubes of the lines before it",
+                line + 1
+            );
+            self.fail(key, message, "let a branch begin on its parent, and stand behind it")
+        })
+    }
+
+    /// Centre lines run in the mesh in which blood flows: of each point of one line; of several, which other meshes may show
+    /// as well, of one point at least.
+    fn check_inside(
+        &self,
+        key: &str,
+        lines: &[Given],
+        mesh: &Mesh,
+        placed: &Instance,
+    ) -> Result<(), SceneError> {
+        let remedy = "give it in the mesh's own space, before the mesh is placed";
+        let [Given { points, .. }] = lines else {
+            // Between two points, so that a short mesh is found.
+            let inside = lines.iter().flat_map(|line| line.points.windows(2)).any(|ends| {
+                (0..4).any(|i| mesh.surrounds(ends[0].lerp(ends[1], f64::from(i) / 4.0)))
+            });
+            return match inside {
+                true => Ok(()),
+                false => {
+                    let message = format!("all of the centre lines lie outside `{}`", placed.name);
+                    Err(self.fail(key, message, remedy))
+                }
+            };
         };
         for (i, &point) in points.iter().enumerate() {
             // The ends may lie on the mesh's openings.
@@ -199,58 +250,17 @@ impl OneFlow<'_> {
                     point.z,
                     placed.name
                 );
-                let remedy = "give it in the mesh's own space, before the mesh is placed";
                 return Err(self.fail(key, message, remedy));
             }
         }
-        if let [first, .., last] = points[..]
+        if let [first, last] = points[..]
             && !mesh.surrounds(first.midpoint(last))
-            && points.len() == 2
         {
             let message = format!("the middle of the centre line lies outside `{}`", placed.name);
             let remedy = "give its ends in the mesh's own space, before the mesh is placed";
             return Err(self.fail(key, message, remedy));
         }
-        let radii = match (radii, radius) {
-            (Some(radii), None) => radii,
-            (Some(_), Some(_)) => {
-                let message = "the file of the centre line has radii already";
-                return Err(self.fail("line.radius", message, "remove it here or there"));
-            }
-            (None, Some(radius)) => vec![*radius; points.len()],
-            (None, None) => self.measured(mesh, &points)?,
-        };
-        CentreLine::new(points, radii).ok_or_else(|| {
-            let message = "the centre line has two points at the same place";
-            self.fail(key, message, "give every point once")
-        })
-    }
-
-    /// Points of a centre line's file, and radii if it has them.
-    fn line_file(&self, file: &str) -> Result<(Vec<DVec3>, Option<Vec<f64>>), SceneError> {
-        let path = self.beside(file);
-        let content = self.text(&path, "line.file")?;
-        let table = Columns::parse(&LINE, &path, &content)?;
-        let Some([x, y, z]) = table.together(["x_mm", "y_mm", "z_mm"])? else {
-            let message = "the centre line has no places".to_owned();
-            return Err(table.fail(0..0, message, "add the columns x_mm, y_mm, z_mm"));
-        };
-        table.check("x_mm")?;
-        let radii = table.together(["radius_mm"])?.map(|[radii]| radii);
-        if x.values.len() < 2 {
-            let at = x.places[0].clone();
-            let message = "a centre line has at least two points".to_owned();
-            return Err(table.fail(at, message, "add the next point"));
-        }
-        if let Some(radii) = radii
-            && let Some(row) = radii.values.iter().position(|radius| *radius <= 0.0)
-        {
-            let message = format!("the radius is {} mm", radii.values[row]);
-            return Err(table.fail(radii.places[row].clone(), message, "it must be above zero"));
-        }
-        let point = |i: usize| DVec3::new(x.values[i], y.values[i], z.values[i]);
-        let points = (0..x.values.len()).map(point).collect();
-        Ok((points, radii.map(|column| column.values.clone())))
+        Ok(())
     }
 
     /// Radii of circles as large as the mesh's cross-sections at the points.

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-/// A line of straight parts with the tube's radius at each point, in the mesh's space. Beyond its ends it goes straight on.
+/// A line of straight parts with the tube's radius at each point, in the mesh's space.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CentreLine {
     /// At least two.
@@ -16,6 +16,8 @@ pub struct CentreLine {
 /// The place of a centre line nearest to another place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Nearest {
+    /// Place along the line, in points: 1.5 is half-way between the second and the third.
+    pub place: f64,
     /// Distance from there.
     pub distance: f64,
     /// Unit direction of the line there.
@@ -49,8 +51,8 @@ impl CentreLine {
     }
 
     /// Radii of the tube at its points.
-    pub fn radii(&self) -> impl Iterator<Item = f64> + '_ {
-        self.radii.iter().copied()
+    pub fn radii(&self) -> &[f64] {
+        &self.radii
     }
 
     /// Radius of the tube where it begins: that in which the flow's speed is stated.
@@ -58,14 +60,22 @@ impl CentreLine {
         self.radii[0]
     }
 
-    /// The place on the line nearest to `place`.
-    pub fn nearest(&self, place: DVec3) -> Nearest {
+    /// A place along the line, in points, in the mesh's space, and the radius there.
+    pub fn at(&self, place: f64) -> (DVec3, f64) {
+        let i = (place.max(0.0) as usize).min(self.points.len() - 2);
+        let on = place - i as f64;
+        let radius = self.radii[i] + on * (self.radii[i + 1] - self.radii[i]);
+        (self.points[i].lerp(self.points[i + 1], on), radius)
+    }
+
+    /// The place on the line nearest to `place`. `open` says whether it goes straight on beyond its beginning and its end.
+    pub fn nearest(&self, place: DVec3, open: [bool; 2]) -> Nearest {
         let last = self.points.len() - 2;
         let parts = self.points.windows(2).enumerate().map(|(i, ends)| {
             let part = ends[1] - ends[0];
             let on = (place - ends[0]).dot(part) / part.length_squared();
-            let low = if i == 0 { f64::NEG_INFINITY } else { 0.0 };
-            let high = if i == last { f64::INFINITY } else { 1.0 };
+            let low = if i == 0 && open[0] { f64::NEG_INFINITY } else { 0.0 };
+            let high = if i == last && open[1] { f64::INFINITY } else { 1.0 };
             let on = on.clamp(low, high);
             (i, on, place.distance_squared(ends[0] + on * part))
         });
@@ -73,6 +83,7 @@ impl CentreLine {
         let on = on.clamp(0.0, 1.0);
         let along = self.directions[i].lerp(self.directions[i + 1], on);
         Nearest {
+            place: i as f64 + on,
             distance: squared.sqrt(),
             along: along.try_normalize().unwrap_or(self.directions[i]),
             radius: self.radii[i] + on * (self.radii[i + 1] - self.radii[i]),
@@ -88,13 +99,19 @@ mod tests {
     fn a_bend_is_followed_and_the_ends_go_straight_on() {
         let points = vec![DVec3::ZERO, DVec3::Z * 10.0, DVec3::new(10.0, 0.0, 10.0)];
         let line = CentreLine::new(points, vec![4.0, 2.0, 1.0]).expect("a line");
-        let near = line.nearest(DVec3::new(0.0, 3.0, -5.0));
+        let open = [true; 2];
+        let near = line.nearest(DVec3::new(0.0, 3.0, -5.0), open);
         assert_eq!((near.distance, near.along, near.radius), (3.0, DVec3::Z, 4.0));
-        let near = line.nearest(DVec3::new(12.0, 0.0, 9.0));
+        let near = line.nearest(DVec3::new(12.0, 0.0, 9.0), open);
         assert_eq!((near.distance, near.along, near.radius), (1.0, DVec3::X, 1.0));
-        let near = line.nearest(DVec3::new(0.0, 0.0, 10.0));
+        // A line that does not go on ends in a cap.
+        let near = line.nearest(DVec3::new(0.0, 3.0, -4.0), [false, true]);
+        assert_eq!((near.distance, near.along, near.place), (5.0, DVec3::Z, 0.0));
+        let near = line.nearest(DVec3::new(0.0, 0.0, 10.0), open);
         assert!(near.along.abs_diff_eq(DVec3::new(1.0, 0.0, 1.0).normalize(), 1e-12));
-        assert_eq!(line.nearest(DVec3::new(0.0, 0.0, 5.0)).radius, 3.0);
+        let near = line.nearest(DVec3::new(0.0, 0.0, 5.0), open);
+        assert_eq!((near.radius, near.place), (3.0, 0.5));
+        assert_eq!(line.at(0.5), (DVec3::Z * 5.0, 3.0));
     }
 
     #[test]

@@ -25,10 +25,11 @@ fn a_straight_vessel_has_the_radius_of_its_cross_sections() {
     let case = Case::new();
     let (scene, _) = case.load(&flow(STRAIGHT), &[]).expect("a flow");
     let flow = &scene.flows[0];
-    let FlowShape::Tube { line, exponent } = &flow.shape else { panic!("a tube") };
-    assert_eq!((*exponent, flow.speed, flow.course.clone()), (2.0, 300.0, Course::Steady));
+    let FlowShape::Tube(vessel) = &flow.shape else { panic!("a tube") };
+    assert_eq!((vessel.lines(), flow.speed, flow.course.clone()), (1, 300.0, Course::Steady));
     // A polygon as large as the circle would be a little wider.
-    assert!(line.radii().all(|r| (r - 4.0).abs() < 0.02), "{line:?}");
+    let (line, _) = vessel.line(0);
+    assert!(line.radii().iter().all(|r| (r - 4.0).abs() < 0.02), "{line:?}");
     let v = flow.velocity(DVec3::X * 2.0, &DAffine3::IDENTITY, 0.0);
     assert!(v.abs_diff_eq(DVec3::Z * 225.0, 1.5), "{v}");
     assert!(scene.is_animated());
@@ -42,8 +43,8 @@ fn files_give_centre_lines_and_waveforms() {
     let text =
         flow("line = { file = \"line.csv\" }\nwaveform = { file = \"pulse.csv\", phase = 0.25 }\n");
     let (mut scene, _) = case.load(&text, &[]).expect("a flow");
-    let FlowShape::Tube { line, .. } = &scene.flows[0].shape else { panic!("a tube") };
-    assert_eq!(line.radii().collect::<Vec<_>>(), [4.0, 2.0, 4.0]);
+    let FlowShape::Tube(vessel) = &scene.flows[0].shape else { panic!("a tube") };
+    assert_eq!(vessel.line(0).0.radii(), [4.0, 2.0, 4.0]);
     // A quarter of a period before its height.
     let height = 0.1 - 0.25 * 0.8;
     assert!((scene.flows[0].course.at(height) + 1.0).abs() < 1e-12);
@@ -57,6 +58,20 @@ fn files_give_centre_lines_and_waveforms() {
     let (scene, _) = case.load(&text, &[]).expect("a flow");
     let v = scene.flows[0].velocity(DVec3::ZERO, &DAffine3::IDENTITY, 0.25);
     assert!(v.abs_diff_eq(DVec3::Y * -300.0, 1e-9), "{v}");
+}
+
+#[test]
+fn a_file_may_have_several_lines_with_profiles_of_their_own() {
+    let case = Case::new();
+    let rows = "line,x_mm,y_mm,z_mm,radius_mm,exponent\n1,0,0,-30,4,2\n1,0,0,0,4,2\n2,0,0,0,3,4\n\
+                2,2,0,30,3,4\n7,0,0,0,3,2\n7,-2,0,30,3,2\n";
+    write(&case, "tree.csv", rows);
+    let (scene, _) = case.load(&flow("line = { file = \"tree.csv\" }\n"), &[]).expect("a flow");
+    let FlowShape::Tube(vessel) = &scene.flows[0].shape else { panic!("a tube") };
+    assert_eq!([0, 1, 2].map(|i| vessel.line(i).1), [1.0, 0.5, 0.5]);
+    // Half of what arrives in 9/16 of the area, with the middle 1.5 times as fast as the mean, not twice.
+    let v = scene.flows[0].velocity(DVec3::new(2.0, 0.0, 30.0), &DAffine3::IDENTITY, 0.0);
+    assert!((v.length() / (300.0 * 8.0 / 9.0 * 0.75) - 1.0).abs() < 1e-9, "{v}");
 }
 
 #[test]
@@ -110,6 +125,23 @@ fn mistakes_of_flows_are_placed() {
         "remove",
     );
     f(&flow("line = { file = \"none.csv\" }\n"), (4, 17), "none.csv", "check the path");
+    let rows = |x: f64| {
+        let head = "line,x_mm,y_mm,z_mm,radius_mm\n1,0,0,-30,4\n1,0,0,30,4\n";
+        format!("{head}2,{x},0,0,1\n2,{x},0,9,1\n")
+    };
+    write(&case, "apart.csv", &rows(6.5));
+    f(
+        &flow("line = { file = \"apart.csv\" }\n"),
+        (4, 17),
+        "line 2 begins 2.5 mm beside",
+        "on its parent",
+    );
+    write(
+        &case,
+        "far.csv",
+        &rows(0.0).replace(",0,0,-30,", ",90,0,-30,").replace(",0,0,", ",90,0,"),
+    );
+    f(&flow("line = { file = \"far.csv\" }\n"), (4, 17), "lines lie outside `vessel`", "own space");
     f(
         &flow(&format!("{STRAIGHT}waveform = {{ period = \"1 s\" }}\n")),
         (5, 12),
@@ -137,6 +169,15 @@ fn mistakes_in_files_of_flows_are_placed() {
             "x_mm,y_mm,z_mm,radius_mm\n0,0,0,1\n0,0,1,0\n",
             3,
             "the radius is 0 mm",
+        ),
+        (&line, "line.csv", "x_mm,y_mm,z_mm,exponent\n0,0,0,2\n0,0,1,0.5\n", 3, "exponent is 0.5"),
+        (&line, "line.csv", "line,x_mm,y_mm,z_mm\n1,0,0,0\n1,0,0,1\n2,0,0,1\n", 4, "at least two"),
+        (
+            &line,
+            "line.csv",
+            "line,x_mm,y_mm,z_mm\n1,0,0,0\n1,0,0,1\n2,0,0,1\n2,0,0,2\n1,0,0,3\n1,0,0,4\n",
+            6,
+            "line 1 begins a second time",
         ),
         (&wave, "pulse.csv", "time_s,speed\n0,1\n0,2\n", 3, "time 0 s occurs twice"),
         (&wave, "pulse.csv", "time_s,speed\n0,1\n1,NaN\n", 3, "speed is not finite"),
