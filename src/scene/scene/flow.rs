@@ -5,7 +5,7 @@
 //! while the other is silent: the squares of their weights add up to 1, so that speckle is as loud at every time. A
 //! generation lives as long as the flow shears it by little enough for its scatterers to be found.
 
-mod course;
+pub mod course;
 mod line;
 mod vessel;
 

@@ -13,13 +13,23 @@ use super::motion::PERIOD;
 use super::placing::PLACE;
 use super::table::{Stated, Table};
 use crate::scene::animation::Clock;
-use crate::scene::flow::{Apart, CentreLine, Course, Flow, FlowShape, Tube, Vessel};
+use crate::scene::flow::{Apart, CentreLine, Course, Flow, FlowShape, Tube, Vessel, course};
 use crate::scene::{Instance, Mesh, Scene, Warning};
 use crate::settings::units::{LENGTH, VELOCITY};
 use crate::settings::{Form, ScatterMode, TextureSpace, group, words};
 
 /// Fastest flow, mm/s: jets of the tightest valves have 6 to 7 m/s.
 const FASTEST: f64 = 20_000.0;
+
+words! {
+    /// Kind of a waveform.
+    pub enum WaveformKind {
+        /// That of a file.
+        File = "file",
+        /// That of a common carotid artery.
+        Carotid = "carotid",
+    }
+}
 
 words! {
     /// Shape of a flow: the way its speed is spread over a mesh.
@@ -70,12 +80,15 @@ group! {
 group! {
     /// The speed over time. Without it the flow is steady.
     pub struct WaveformKeys in "flow.waveform" {
+        /// Speed over a heartbeat: that of a file, or that of a common carotid artery, which begins at the end of diastole.
+        kind: WaveformKind = WaveformKind::File, Facts::word::<WaveformKind>();
         /// One period: a CSV file, relative to the scene file, with columns `time_s` and `speed`, in any unit: the largest one
-        /// is the flow's `speed`.
+        /// is the flow's `speed`. File only.
         file: Option<String> = None, Facts::of(Form::Text).by_default("steady");
-        /// Length of the period.
-        period: Option<f64> = None, PERIOD.by_default("that of the file");
-        /// Place in the period at time 0.
+        /// Length of the period. By default that of the file; of a carotid artery that of what beats in the scene, with which it
+        /// then keeps time, or else 1.1 s.
+        period: Option<f64> = None, PERIOD.by_default("see there");
+        /// Place in the period at time 0, or in that of what beats.
         phase: f64 = 0.0, Facts::number(0.0, 1.0);
     }
 }
@@ -163,7 +176,7 @@ impl OneFlow<'_> {
             }
             FlowKind::Tube => FlowShape::Tube(self.vessel(&scene.meshes[placed.mesh], placed)?),
         };
-        Ok(Flow::new(name.clone(), instance, shape, *speed, self.course()?))
+        Ok(Flow::new(name.clone(), instance, shape, *speed, self.course(scene)?))
     }
 
     /// The centre lines of a tube and its branches.
@@ -291,8 +304,19 @@ impl OneFlow<'_> {
             })
     }
 
-    fn course(&self) -> Result<Course, SceneError> {
-        let WaveformKeys { file, period, phase } = &self.stated.get("waveform.");
+    fn course(&self, scene: &Scene) -> Result<Course, SceneError> {
+        let WaveformKeys { kind, file, period, phase } = &self.stated.get("waveform.");
+        if *kind == WaveformKind::Carotid {
+            if file.is_some() {
+                let message = "the waveform of a carotid artery needs no file";
+                return Err(self.fail("waveform.file", message, "remove `file`, or `kind`"));
+            }
+            let beat = scene.beat().filter(|_| period.is_none());
+            let own = period.unwrap_or(course::CAROTID_PERIOD);
+            let (period, start) = beat.map_or((own, 0.0), |clock| (clock.period, clock.phase));
+            let clock = Clock { period, phase: (start + phase).fract(), ..Clock::default() };
+            return Ok(Course::pulsatile(clock, course::carotid()));
+        }
         let Some(file) = file else {
             return match self.stated.has("waveform") {
                 true => {

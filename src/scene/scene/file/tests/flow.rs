@@ -74,6 +74,31 @@ fn a_file_may_have_several_lines_with_profiles_of_their_own() {
     assert!((v.length() / (300.0 * 8.0 / 9.0 * 0.75) - 1.0).abs() < 1e-9, "{v}");
 }
 
+/// By itself the waveform of a carotid artery has its own period, with `period` that, and with a beat the beat's.
+#[test]
+fn a_carotid_waveform_keeps_time_with_what_beats() {
+    let case = Case::new();
+    let beat = "[[selector]]\nname = \"beat\"\nperiod = \"0.8 s\"\nphase = 0.25\n\
+                [[mesh]]\nname = \"a\"\nparent = \"beat\"\nshape = { sphere = { radius = 1 } }\ntissue = \"fat\"\n";
+    for (keys, scene, (period, start)) in [
+        ("", "", (1.1, 0.0)),
+        (", phase = 0.5", "", (1.1, 0.5)),
+        (", period = \"0.9 s\"", beat, (0.9, 0.0)),
+        ("", beat, (0.8, 0.25)),
+        (", phase = 0.9", beat, (0.8, 0.15)),
+    ] {
+        let text = flow(&format!("{STRAIGHT}waveform = {{ kind = \"carotid\"{keys} }}\n{scene}"));
+        let course = case.load(&text, &[]).expect("a flow").0.flows.remove(0).course;
+        // The height of the beat is at 0.182 of it.
+        let height = |seconds: f64| course.at(seconds) > 0.99;
+        assert!(height((0.182 - start) * period), "{keys}, {scene}");
+        assert!(height((1.182 - start) * period) && !height((0.6 - start) * period));
+    }
+    let both = format!("{STRAIGHT}waveform = {{ kind = \"carotid\", file = \"pulse.csv\" }}\n");
+    let table = vessel("").lines().count() + 1;
+    case.fails(&flow(&both), (table + 5, 39), "needs no file", "remove");
+}
+
 #[test]
 fn settings_with_which_blood_stands_still_are_warned_of() {
     let case = Case::new();
