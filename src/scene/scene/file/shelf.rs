@@ -5,8 +5,10 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::columns::text;
 use super::document::Document;
 use super::error::SceneError;
+use super::lines::{self, Given};
 use super::table::{Stated, Table};
 use crate::scene::mesh::{self, Options, Units};
 use crate::scene::{Issue, Mesh, shapes};
@@ -65,6 +67,13 @@ group! {
         length: f64 = 0.0, LONG.key("cylinder.length");
         /// Sides of the polygon that stands for the circle.
         segments: u32 = 96, Facts::whole(3, 4096).key("cylinder.segments");
+        /// A CSV file of centre lines with radii, relative to the scene file, as of a `[[flow]]`. Ends are round, and the tubes
+        /// of several lines reach into each other.
+        line: String = String::new(), Facts::of(Form::Text).required().key("tube.file");
+        /// Length by which it is wider than the file says: that of a wall.
+        wall: f64 = 0.0, Facts::quantity(&LENGTH, 0.0, 1e3).key("tube.wall");
+        /// Sides of the polygon that stands for the circle.
+        sides: u32 = 48, Facts::whole(3, 4096).key("tube.segments");
         /// Edges along x, y, z.
         edges: [f64; 3] = [0.0; 3], longs(3).key("box.size");
         /// Edges along x and y of a slab whose front is at z = 0.
@@ -224,7 +233,7 @@ fn affordable(document: &Document<'_>, path: &str, triangles: usize) -> Result<(
     Err(document.fail(
         path,
         format!("with this mesh the scene has {triangles} triangles; it may have {MAX_TRIANGLES}"),
-        "lower `subdivisions` of shapes, reduce meshes in the modeller, or name fewer keyframes",
+        "lower `subdivisions` and `segments` of shapes, reduce meshes in the modeller, or name fewer keyframes",
     ))
 }
 
@@ -242,6 +251,8 @@ pub(super) fn countable(
             () if has("sphere") => divided(s.ball_divisions),
             () if has("ellipsoid") => divided(s.divisions),
             () if has("cylinder") => 4 * s.segments as usize,
+            // How many rings there are its file says: it is counted where it is read.
+            () if has("tube") => 0,
             () => 12 * usize::from(has("box") || has("plane")),
         });
         affordable(document, &format!("mesh.{i}"), sum)?;
@@ -285,7 +296,7 @@ fn built(
             "remove it",
         ));
     }
-    let kinds = ["sphere", "ellipsoid", "cylinder", "box", "plane"];
+    let kinds = ["sphere", "ellipsoid", "cylinder", "tube", "box", "plane"];
     let given = kinds.into_iter().filter(|kind| stated.has(&format!("shape.{kind}")));
     let given: Vec<_> = given.collect();
     let s: ShapeKeys = stated.get("shape.");
@@ -293,6 +304,7 @@ fn built(
         ["sphere"] => shapes::sphere(s.ball, s.ball_divisions),
         ["ellipsoid"] => shapes::ellipsoid(s.radii, s.divisions),
         ["cylinder"] => shapes::cylinder(s.radius, s.length, s.segments),
+        ["tube"] => tubes(document, &s, name, path)?,
         ["box"] => shapes::cuboid(s.edges),
         ["plane"] => shapes::plane(s.size, s.thickness),
         _ => {
@@ -303,4 +315,44 @@ fn built(
             ));
         }
     })
+}
+
+/// The tubes around the lines of a file, as one mesh.
+fn tubes(
+    document: &Document<'_>,
+    keys: &ShapeKeys,
+    name: &str,
+    path: &str,
+) -> Result<Mesh, SceneError> {
+    let fail = |message: String, remedy: &str| {
+        document.fail(
+            &format!("{path}.shape.tube.file"),
+            format!("mesh `{name}`: {message}"),
+            remedy,
+        )
+    };
+    let folder = document.source.path.parent().unwrap_or(Path::new(""));
+    let file = folder.join(&keys.line);
+    let content = text(&file).map_err(|e| fail(e.to_string(), "check the path of the file"))?;
+    let lines = lines::read(&file, &content)?;
+    let rings = |line: &Given| line.points.len() + 2 * shapes::END_RINGS as usize;
+    let triangles = 2 * keys.sides as usize * lines.iter().map(rings).sum::<usize>();
+    affordable(document, path, triangles)?;
+    let mut mesh = Mesh::default();
+    for Given { points, radii, .. } in lines {
+        let Some(radii) = radii else {
+            return Err(fail("the file has no radii".to_owned(), "add the column radius_mm"));
+        };
+        if let Some(i) = points.windows(2).position(|ends| ends[0] == ends[1]) {
+            let message = format!("points {} and {} of a line are the same", i + 1, i + 2);
+            return Err(fail(message, "give every point once"));
+        }
+        let wide: Vec<f64> = radii.iter().map(|radius| radius + keys.wall).collect();
+        let tube = shapes::tube(&points, &wide, keys.sides);
+        let first = mesh.positions.len() as u32;
+        mesh.positions.extend(tube.positions);
+        mesh.normals.extend(tube.normals);
+        mesh.triangles.extend(tube.triangles.iter().map(|t| t.map(|vertex| vertex + first)));
+    }
+    Ok(mesh)
 }

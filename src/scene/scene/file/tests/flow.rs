@@ -74,6 +74,43 @@ fn a_file_may_have_several_lines_with_profiles_of_their_own() {
     assert!((v.length() / (300.0 * 8.0 / 9.0 * 0.75) - 1.0).abs() < 1e-9, "{v}");
 }
 
+#[test]
+fn a_tube_is_made_around_the_lines_along_which_blood_flows() {
+    let case = Case::new();
+    let rows = "line,x_mm,y_mm,z_mm,radius_mm\n1,0,0,-30,4\n1,0,0,0,4\n2,0,0,0,3\n2,0,10,20,2\n2,0,16,40,2\n";
+    write(&case, "tree.csv", rows);
+    let file = "file = \"tree.csv\"";
+    let tube = |more: &str| {
+        let shape = format!("shape = {{ tube = {{ {file}{more} }} }}");
+        flow(&format!("line = {{ {file} }}\n"))
+            .replace("shape = { cylinder = { radius = 4, length = 60 } }", &shape)
+    };
+    let (scene, _) = case.load(&tube(", segments = 24"), &[]).expect("a vessel");
+    let mesh = &scene.meshes[scene.instances[0].mesh];
+    assert_eq!(mesh.triangles.len(), (2 + 10) * 48 + (3 + 10) * 48);
+    // Inside of the lumen, of its wall, and outside.
+    let wall = case.load(&tube(", wall = 1"), &[]).expect("a wall").0;
+    let wall = &wall.meshes[wall.instances[0].mesh];
+    for (place, in_lumen, in_wall) in [
+        ([0.0, 3.9, -20.0], true, true),
+        ([4.4, 0.0, -20.0], false, true),
+        ([0.0, -3.0, 30.0], false, false),
+    ] {
+        let place = DVec3::from(place);
+        assert_eq!((mesh.surrounds(place), wall.surrounds(place)), (in_lumen, in_wall), "{place}");
+    }
+    let at = |text: &str, cause: &str, remedy: &str| {
+        let line = text.lines().position(|l| l.starts_with("shape")).expect("it has one") + 1;
+        let column = text.lines().nth(line - 1).expect("there").find("\"").expect("a file") + 1;
+        case.fails(text, (line, column), cause, remedy);
+    };
+    write(&case, "thin.csv", "x_mm,y_mm,z_mm\n0,0,0\n0,0,1\n");
+    at(&tube("").replace("tree", "thin"), "no radii", "radius_mm");
+    write(&case, "same.csv", "x_mm,y_mm,z_mm,radius_mm\n0,0,0,1\n0,0,1,1\n0,0,1,1\n");
+    at(&tube("").replace("tree", "same"), "points 2 and 3 of a line are the same", "once");
+    at(&tube("").replace("tree", "none"), "none.csv", "check the path");
+}
+
 /// By itself the waveform of a carotid artery has its own period, with `period` that, and with a beat the beat's.
 #[test]
 fn a_carotid_waveform_keeps_time_with_what_beats() {
