@@ -40,7 +40,7 @@ Start with:
   insonify view heart                  the window with a scene that ships, or with a scene file
   insonify render abdomen -o out/abdomen.png
   insonify info                        the Vulkan devices of this machine
-Scenes that ship: abdomen, artery, early, ectopic, fetus, heart, limbs, phantom, pregnancy.";
+Scenes that ship: abdomen, artery, carotid, early, ectopic, fetus, heart, limbs, phantom, pregnancy.";
 
 #[derive(Debug, Subcommand)]
 enum Command {

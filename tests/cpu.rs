@@ -9,6 +9,7 @@ mod common {
 
 mod animated;
 mod calibration;
+mod carotid;
 mod dicom;
 mod docs;
 mod keyframes;

@@ -258,7 +258,7 @@ fn scenes_that_ship_are_found_from_anywhere_and_stay_as_they_are() {
     assert!(text(&out.stdout).contains("Mine"), "{}", text(&out.stdout));
     let out = elsewhere(home.path(), &["render", "hart"]);
     let said = text(&out.stderr) + &text(&out.stdout);
-    assert!(said.contains("scenes that ship: abdomen, artery"), "{said}");
+    assert!(said.contains("scenes that ship: abdomen, artery, carotid"), "{said}");
     // What was unpacked is not written to.
     let scene = ["register", "pregnancy", "--surface", "decidua", "--in-place", "--volume-surface"];
     let surface = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/fetus/decidua.obj");

@@ -15,7 +15,7 @@ use insonify::teach::{Attempt, Path as Way, Score};
 
 fn scenes() -> Vec<(PathBuf, Scene)> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
-    let all = ["abdomen", "artery", "fetus", "heart", "phantom"];
+    let all = ["abdomen", "artery", "carotid", "fetus", "heart", "phantom"];
     let load = |name: &str| {
         let path = folder.join(format!("{name}.toml"));
         let (scene, _) = Scene::load(&path, &[]).unwrap_or_else(|e| panic!("{e}"));
