@@ -168,7 +168,7 @@ impl Visitor for Others<'_> {
         if !ELABORATE.contains(&T::TABLE) {
             let (first, rest) = T::TABLE.split_at(1);
             let colour = (T::TABLE == Doppler::TABLE).then_some(&mut *self.colour);
-            section(self.ui, &(first.to_uppercase() + rest), false, |ui| {
+            section(self.ui, &(first.to_uppercase() + &rest.replace('_', " ")), false, |ui| {
                 if let Some(colour) = colour {
                     switch(ui, colour);
                 }

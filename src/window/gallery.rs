@@ -13,8 +13,10 @@ use crate::scene::shipped::{self, SCENES, Shipped};
 
 /// Room for one picture, points.
 const PICTURE: egui::Vec2 = vec2(190.0, 130.0);
-/// Pictures in a row.
-const COLUMNS: usize = 3;
+/// Pictures in a row, where the window is wide enough.
+const COLUMNS: usize = 4;
+/// Room between two pictures, points.
+const BETWEEN: f32 = 10.0;
 
 /// First steps, in three lines.
 pub const FIRST_STEPS: [&str; 3] = [
@@ -110,7 +112,9 @@ fn lately(ui: &mut Ui, recent: &[PathBuf]) -> Option<PathBuf> {
 /// Draws all pictures with their names; returns the one that was clicked.
 fn pictures(ui: &mut Ui) -> Option<&'static Shipped> {
     let mut chosen = None;
-    egui::Grid::new("gallery").num_columns(COLUMNS).spacing([10.0, 8.0]).show(ui, |ui| {
+    let fitting = ui.ctx().content_rect().width() / (PICTURE.x + BETWEEN) - 0.5;
+    let columns = (fitting as usize).clamp(1, COLUMNS);
+    egui::Grid::new("gallery").num_columns(columns).spacing([BETWEEN, 8.0]).show(ui, |ui| {
         for (index, scene) in SCENES.iter().enumerate() {
             ui.vertical(|ui| {
                 ui.set_width(PICTURE.x);
@@ -127,7 +131,7 @@ fn pictures(ui: &mut Ui) -> Option<&'static Shipped> {
                     chosen = Some(scene);
                 }
             });
-            if index % COLUMNS == COLUMNS - 1 {
+            if index % columns == columns - 1 {
                 ui.end_row();
             }
         }

@@ -154,7 +154,7 @@ fn each_section_sets_what_is_saved_and_undo_takes_it_back() {
         "Processing",
         "Doppler",
         "Spectral",
-        "Tissue_doppler",
+        "Tissue doppler",
         "Strain",
         "Fusion",
         "Registration",
