@@ -29,7 +29,8 @@ pub(super) const ROW: Row = Row {
     tip: "Pulsed or continuous wave Doppler: velocities in the gate against time",
     key: Some((Key::F6, "F6")),
     dock: Dock::Below { height: 250.0, alone: false },
-    has_button: true,
+    // The bar has no room for one more where 3D view and console are open.
+    has_button: false,
 };
 
 /// Widest raster, pixels.
