@@ -46,8 +46,8 @@ pub fn note_once(text: String) {
     }
 }
 
-/// What is said where a program's own files cannot be kept: `what` is not, because of the `cause` at `place`, none where the
-/// system names no folder. `variable` is the variable of the environment that names another one.
+/// The sentence that says that a program's own files cannot be kept: `what` is not, because of the `cause` at `place`, none where
+/// the system names no folder. `variable` is the variable of the environment that names another one.
 pub fn not_kept(what: &str, place: Option<&Path>, cause: &str, variable: &str) -> String {
     match place {
         Some(place) => format!(

@@ -24,9 +24,9 @@ pub struct Deformation {
 
 /// Compares two images' complex baseband, pairs by scanline and sample, the one that is shown last. For each sample the echoes of
 /// a window around it are looked for in the image before: the shift at which they are most alike, refined by the phase between
-/// them, which is 4 pi f / c times the way, and laid onto each other by that again (Pesavento et al. 1999, IEEE Trans. Ultrason. Ferroelectr. Freq. Control 46,
-/// 1057-1067). A window's way is that of where its echoes are loudest (Lindop et
-/// al. 2006, CUED/F-INFENG/TR 550), and the strain is the slope of the line that fits the ways best.
+/// them, which is 4 pi f / c times the way, and laid onto each other by that again (Pesavento et al. 1999, IEEE Trans.
+/// Ultrason. Ferroelectr. Freq. Control 46, 1057-1067). A window's way is that of where its echoes are loudest (Lindop et al.
+/// 2006, CUED/F-INFENG/TR 550), and the strain is the slope of the line that fits the ways best.
 pub fn deformation(probe: &Probe, strain: &Strain, [before, after]: [&[f32]; 2]) -> Deformation {
     let samples = probe.samples as usize;
     let lines = before.par_chunks_exact(2 * samples).zip(after.par_chunks_exact(2 * samples));
@@ -42,99 +42,131 @@ pub fn deformation(probe: &Probe, strain: &Strain, [before, after]: [&[f32]; 2])
 
 /// The same along one scanline.
 fn along(probe: &Probe, strain: &Strain, lines: [&[f32]; 2]) -> Deformation {
-    let pitch = probe.sample_pitch();
     let complex = |line: &[f32]| -> Vec<Complex<f64>> {
         line.chunks_exact(2).map(|z| Complex::new(z[0].into(), z[1].into())).collect()
     };
     let [before, after] = lines.map(complex);
-    let count = before.len() as i64;
+    let pitch = probe.sample_pitch();
     let half = ((strain.window / pitch / 2.0).round() as i64).max(1);
-    let reach = (strain.reach / pitch).ceil() as i64;
-    // Sums over the window around a sample, by differences of sums from the beginning.
-    let sums = |values: &mut dyn Iterator<Item = Complex<f64>>| -> Vec<Complex<f64>> {
-        let mut sum = Complex::default();
-        let sums = values.map(|value| {
-            sum += value;
-            sum
-        });
-        std::iter::once(Complex::default()).chain(sums).collect()
-    };
-    let window = |sums: &[Complex<f64>], k: i64| {
-        let [from, to] = [k - half, k + half + 1].map(|at| at.clamp(0, count) as usize);
-        sums[to] - sums[from]
-    };
-    let power = |line: &[Complex<f64>]| sums(&mut line.iter().map(|z| z.norm_sqr().into()));
-    let powers = [power(&before), power(&after)];
-    let mut best = vec![(0.0, 0_i64, Complex::default()); before.len()];
-    for shift in -reach..=reach {
-        // What is at a sample now was `shift` samples nearer to the probe.
-        let was = |k: i64| before.get(usize::try_from(k - shift).ok()?).copied();
-        let pairs = (0..count)
-            .zip(&after)
-            .map(|(k, now)| was(k).map_or(Complex::default(), |was| was.conj() * now));
-        let products = sums(&mut pairs.into_iter());
-        for (k, best) in (0..count).zip(&mut best) {
-            let sum = window(&products, k);
-            let energy =
-                window(&powers[0], (k - shift).clamp(0, count)).re * window(&powers[1], k).re;
-            let alike = if energy > 0.0 { sum.norm() / energy.sqrt() } else { 0.0 };
-            if alike > best.0 {
-                *best = (alike, shift, sum);
-            }
-        }
-    }
-    // Half a wavelength further away the phase is the same.
-    let half_wave = probe.speed / (2.0 * probe.frequency);
-    let nearest = |sum: Complex<f64>, to: f64| {
-        let fine = -sum.arg() / (2.0 * PI) * half_wave;
-        fine + ((to - fine) / half_wave).round() * half_wave
-    };
-    // Echoes that are laid onto each other only to a sample differ by what speckle is in between; those laid where they belong do not.
-    let laid = |k: i64, way: f64| {
-        let shift = way / pitch;
-        let (whole, part) = (shift.floor() as i64, shift - shift.floor());
-        let was = |k: i64| {
-            usize::try_from(k).ok().and_then(|k| before.get(k).copied()).unwrap_or_default()
-        };
-        let pair = |k: i64| {
-            let between = was(k - whole) * (1.0 - part) + was(k - whole - 1) * part;
-            between.conj() * after[k as usize]
-        };
-        let all = ((k - half).max(0)..(k + half + 1).min(count)).map(|k| (k as f64, pair(k)));
-        let none = (Complex::default(), 0.0, 0.0);
-        all.fold(none, |(sum, loud, moment): (Complex<f64>, f64, f64), (k, pair)| {
-            (sum + pair, loud + pair.norm(), moment + k * pair.norm())
-        })
-    };
-    let way = |(k, &(_, shift, sum)): (i64, &(f64, i64, Complex<f64>))| {
-        let first = (nearest(sum, shift as f64 * pitch), k as f64);
-        (0..REFINED).fold(first, |(way, at), _| {
-            let (sum, loud, moment) = laid(k, way);
-            (nearest(sum, way), if loud > 0.0 { moment / loud } else { at })
-        })
-    };
-    // Each way, and the sample at which it is the window's: where its echoes are loudest on the average.
-    let ways: Vec<(f64, f64)> = (0..).zip(&best).map(way).collect();
+    let pair = Pair { before, after, half };
+    let coarse = pair.coarse((strain.reach / pitch).ceil() as i64);
+    let half_wave = probe.speed / (2.0 * probe.frequency) / pitch;
+    let ways = (0..).zip(&coarse).map(|(k, coarse)| pair.refined(k, coarse, half_wave));
+    let ways: Vec<[f64; 2]> = ways.collect();
     let fit = ((strain.length / pitch / 2.0).round() as i64).max(1);
-    let line = |k: i64| {
-        let reach = fit.min(k).min(count - 1 - k);
-        let near = &ways[(k - reach) as usize..(k + reach + 1) as usize];
-        let mean =
-            |of: fn(&(f64, f64)) -> f64| near.iter().map(of).sum::<f64>() / near.len() as f64;
-        let (way, at) = (mean(|near| near.0), mean(|near| near.1));
-        let squares: f64 = near.iter().map(|near| (near.1 - at).powi(2)).sum();
-        let moment: f64 = near.iter().map(|near| (near.1 - at) * near.0).sum();
-        let slope = if squares > 0.0 { moment / squares } else { 0.0 };
-        (way + slope * (k as f64 - at), slope / pitch)
-    };
-    let lines: Vec<(f64, f64)> = (0..count).map(line).collect();
+    let lines: Vec<[f64; 2]> = (0..ways.len() as i64).map(|k| fitted(&ways, k, fit)).collect();
     // Of the slope over where tissue is now: what is now 1 was 1 - slope.
     let natural = |slope: f64| -(1.0 - slope).max(1e-3).ln();
     Deformation {
-        strain: lines.iter().map(|line| natural(line.1) as f32).collect(),
-        displacement: lines.iter().map(|line| line.0 as f32).collect(),
-        likeness: best.iter().map(|best| best.0.min(1.0) as f32).collect(),
+        strain: lines.iter().map(|line| natural(line[1]) as f32).collect(),
+        displacement: lines.iter().map(|line| (line[0] * pitch) as f32).collect(),
+        likeness: coarse.iter().map(|coarse| coarse.likeness.min(1.0) as f32).collect(),
     }
+}
+
+/// A scanline of two images; windows of echoes reach `half` samples to either side.
+struct Pair {
+    before: Vec<Complex<f64>>,
+    after: Vec<Complex<f64>>,
+    half: i64,
+}
+
+/// The shift at which the echoes of a window are most alike, in samples.
+#[derive(Clone, Copy, Default)]
+struct Coarse {
+    likeness: f64,
+    shift: i64,
+    /// Sum of the echoes after times the conjugates of those before, shifted so.
+    product: Complex<f64>,
+}
+
+impl Pair {
+    /// An echo of the image before; none beyond its ends.
+    fn was(&self, k: i64) -> Complex<f64> {
+        usize::try_from(k).ok().and_then(|k| self.before.get(k).copied()).unwrap_or_default()
+    }
+
+    /// The best shift for the window around each sample, up to `reach` samples.
+    fn coarse(&self, reach: i64) -> Vec<Coarse> {
+        let count = self.after.len() as i64;
+        // The sum over the window around a sample, by the difference of sums from the beginning.
+        let window = |sums: &[Complex<f64>], k: i64| {
+            let ends = [k - self.half, k + self.half + 1];
+            let [from, to] = ends.map(|at| at.clamp(0, count) as usize);
+            sums[to] - sums[from]
+        };
+        let power = |line: &[Complex<f64>]| sums(line.iter().map(|z| z.norm_sqr().into()));
+        let [before, after] = [power(&self.before), power(&self.after)];
+        let mut best = vec![Coarse::default(); self.after.len()];
+        for shift in -reach..=reach {
+            // What is at a sample now was `shift` samples nearer to the probe.
+            let pairs = (0..).zip(&self.after).map(|(k, now)| self.was(k - shift).conj() * now);
+            let products = sums(pairs);
+            for (k, best) in (0..).zip(&mut best) {
+                let product = window(&products, k);
+                let was = window(&before, (k - shift).clamp(0, count));
+                let energy = was.re * window(&after, k).re;
+                let likeness = if energy > 0.0 { product.norm() / energy.sqrt() } else { 0.0 };
+                if likeness > best.likeness {
+                    *best = Coarse { likeness, shift, product };
+                }
+            }
+        }
+        best
+    }
+
+    /// The way of the window around sample `k`, and the sample at which it is the window's: where its echoes are loudest on the
+    /// average; both in samples. Ways that differ by `half_wave` have the same phase.
+    fn refined(&self, k: i64, coarse: &Coarse, half_wave: f64) -> [f64; 2] {
+        let nearest = |product: Complex<f64>, to: f64| {
+            let fine = -product.arg() / (2.0 * PI) * half_wave;
+            fine + ((to - fine) / half_wave).round() * half_wave
+        };
+        let first = [nearest(coarse.product, coarse.shift as f64), k as f64];
+        (0..REFINED).fold(first, |[way, at], _| {
+            let (product, loud, moment) = self.laid(k, way);
+            [nearest(product, way), if loud > 0.0 { moment / loud } else { at }]
+        })
+    }
+
+    /// The product of the window around sample `k` when both images are laid onto each other by a way of any fraction of a
+    /// sample (to a sample, they would differ by what speckle is in between), its echoes' loudness, and that times their samples.
+    fn laid(&self, k: i64, way: f64) -> (Complex<f64>, f64, f64) {
+        let (whole, part) = (way.floor() as i64, way - way.floor());
+        let echo = |k: i64| {
+            let was = self.was(k - whole) * (1.0 - part) + self.was(k - whole - 1) * part;
+            was.conj() * self.after[k as usize]
+        };
+        let count = self.after.len() as i64;
+        let window = (k - self.half).max(0)..(k + self.half + 1).min(count);
+        let none = (Complex::default(), 0.0, 0.0);
+        window.fold(none, |(sum, loud, moment): (Complex<f64>, f64, f64), k| {
+            let echo = echo(k);
+            (sum + echo, loud + echo.norm(), moment + k as f64 * echo.norm())
+        })
+    }
+}
+
+/// Sums of values from the first one on; 0 before it.
+fn sums(values: impl Iterator<Item = Complex<f64>>) -> Vec<Complex<f64>> {
+    let mut sum = Complex::default();
+    let sums = values.map(|value| {
+        sum += value;
+        sum
+    });
+    std::iter::once(Complex::default()).chain(sums).collect()
+}
+
+/// The line that fits best the ways up to `fit` samples from sample `k`, each at its place: its value there, and its slope.
+fn fitted(ways: &[[f64; 2]], k: i64, fit: i64) -> [f64; 2] {
+    let reach = fit.min(k).min(ways.len() as i64 - 1 - k);
+    let near = &ways[(k - reach) as usize..(k + reach + 1) as usize];
+    let mean = |of: usize| near.iter().map(|near| near[of]).sum::<f64>() / near.len() as f64;
+    let [way, at] = [0, 1].map(mean);
+    let squares: f64 = near.iter().map(|near| (near[1] - at).powi(2)).sum();
+    let moment: f64 = near.iter().map(|near| (near[1] - at) * near[0]).sum();
+    let slope = if squares > 0.0 { moment / squares } else { 0.0 };
+    [way + slope * (k as f64 - at), slope]
 }
 
 #[cfg(test)]

@@ -179,8 +179,7 @@ impl Simulator {
         values: &[Option<f64>],
         shown: Option<&Image>,
     ) -> Result<(), SimError> {
-        let times = vec![0.0; 2];
-        let packet = Packet { times, lines, samples, renewed: false };
+        let packet = Packet { times: vec![0.0], lines, samples, renewed: false };
         let of = |value: &Option<f64>| value.map_or_else(Correlation::default, Correlation::loud);
         let found: Vec<Correlation> = values.iter().map(of).collect();
         let work = work(scene, doppler, ColourMode::Color, &packet);
@@ -202,13 +201,12 @@ impl Simulator {
         lane.packets.correlate(cmd.device(), packet.lines.len() * packet.samples.len())?;
         // The packet has left its own.
         lane.set(&mut cmd, self.passes.shown, &self.tables)?;
-        let first = match (found, &lane.packets.correlations) {
-            (Some(found), Some(buffer)) => {
-                cmd.write(buffer, 0, bytemuck::cast_slice(found))?;
-                COLOUR.len() - 1
-            }
-            _ => 0,
-        };
+        let mut first = 0;
+        if let Some(found) = found {
+            let buffer = lane.packets.correlations.as_ref().expect("just made");
+            cmd.write(buffer, 0, bytemuck::cast_slice(found))?;
+            first = COLOUR.len() - 1;
+        }
         let coloured = self.passes.colour(&mut cmd, work, first, self.last.fused)?;
         if let Some(image) = shown {
             cmd.copy_to_image(coloured, image)?;

@@ -63,6 +63,7 @@ mod recent;
 mod ring;
 mod saved;
 mod session;
+mod spans;
 mod spectrum;
 mod state;
 mod statistics;

@@ -3,18 +3,19 @@
 use std::time::Instant;
 
 use egui::{
-    Align2, Color32, ColorImage, Context, DragValue, FontId, Key, PointerButton, Pos2, Rect, Sense,
-    Stroke, TextureHandle, TextureOptions, Ui, pos2, vec2,
+    Align2, Color32, ColorImage, Context, DragValue, FontId, Key, Rect, Sense, Stroke,
+    TextureHandle, TextureOptions, Ui, pos2, vec2,
 };
 use glam::DVec2;
 use serde_json::json;
 
 use super::captures::SavedStrip;
 use super::model::Model;
-use super::model::mmode::{Aim, ROWS, Span, Strip, nearest_line};
+use super::model::mmode::{Aim, ROWS, Strip, nearest_line};
 use super::panel::{Desk, Dock, OpenPanels, Panel, Row};
 use super::picture::Frame;
 use super::place::Place;
+use super::spans::{self, Spans};
 use super::style;
 use crate::probe::Probe;
 
@@ -30,23 +31,15 @@ pub(super) const ROW: Row = Row {
 /// Widest raster, pixels.
 const WIDEST: usize = 1024;
 
-/// Choices for the width of the strip, s.
-const WINDOWS: [f64; 5] = [1.0, 2.0, 4.0, 8.0, 16.0];
-
 /// Columns per second of the scene below which a heart's valves look like stairs: those of a slow scanner.
 const FEW: f64 = 200.0;
-
-/// Most measurements at a time: one for each letter.
-const MOST: usize = 26;
 
 /// The state of the panel.
 pub(super) struct MmodePanel {
     /// Seconds across the strip.
-    pub(super) window: f64,
-    /// The measurements, oldest first.
-    pub(super) spans: Vec<Span>,
-    /// The last of them is being drawn.
-    drawing: bool,
+    window: f64,
+    /// What is measured.
+    spans: Spans,
     /// The line of the last strip.
     aim: Option<Aim>,
     /// The strip on the device, and its content: revision, seconds across, pixels across.
@@ -55,7 +48,7 @@ pub(super) struct MmodePanel {
 
 impl Default for MmodePanel {
     fn default() -> Self {
-        Self { window: 2.0, spans: Vec::new(), drawing: false, aim: None, texture: None }
+        Self { window: 2.0, spans: Spans::default(), aim: None, texture: None }
     }
 }
 
@@ -67,15 +60,15 @@ pub(super) fn saved(model: &Model, panel: &MmodePanel) -> Option<SavedStrip> {
         Aim::Scanline(line) => json!({ "scanline": line }),
         Aim::Free(ends) => json!({ "free_mm": ends.map(|end| end.to_array()) }),
     };
-    let measurements = ('A'..='Z').zip(&panel.spans).map(|(letter, span)| {
+    let measurements = panel.spans.lettered().map(|(letter, span)| {
         json!({
             "letter": letter,
             "from_s_mm": span.from,
             "to_s_mm": span.to,
             "seconds": span.seconds(),
-            "mm": span.millimetres(),
+            "mm": span.height(),
             "per_minute": span.per_minute(),
-            "mm_per_s": span.speed(),
+            "mm_per_s": span.slope(),
         })
     });
     let facts = json!({
@@ -149,7 +142,7 @@ impl Panel for MmodePanel {
             draw(ui, strip, panel, inner, end);
             let Some(depth) = strip.length() else { return };
             depths(ui, inner, depth);
-            seconds(ui, inner, panel.window, end);
+            spans::seconds(ui, inner, panel.window, end);
             let at = |[seconds, mm]: [f64; 2]| {
                 let x = 1.0 - ((end - seconds) / panel.window) as f32;
                 inner.min + inner.size() * vec2(x, (mm / depth) as f32)
@@ -159,23 +152,9 @@ impl Panel for MmodePanel {
                 let seconds = end - panel.window * f64::from(1.0 - share.x);
                 [seconds, depth * f64::from(share.y)]
             };
-            if response.drag_started_by(PointerButton::Primary) {
-                let origin = ui.input(|i| i.pointer.press_origin());
-                if let Some(from) = origin.map(under).filter(|_| panel.spans.len() < MOST) {
-                    panel.spans.push(Span { from, to: from });
-                    panel.drawing = true;
-                }
-            }
-            if let (true, Some(span), Some(point)) =
-                (panel.drawing, panel.spans.last_mut(), response.interact_pointer_pos())
-            {
-                span.to = under(point);
-            }
-            panel.drawing &= !response.drag_stopped();
+            panel.spans.drag(ui, &response, under);
             response.on_hover_text("Drag from one point to another to measure time and depth");
-            for (letter, span) in ('A'..='Z').zip(&panel.spans) {
-                marked(ui, inner, [at(span.from), at(span.to)], letter);
-            }
+            panel.spans.show(ui, inner, at);
         });
     }
 
@@ -214,8 +193,7 @@ fn line(ui: &mut Ui, strip: &mut Strip, probe: &Probe) {
 fn width(ui: &mut Ui, panel: &mut MmodePanel) {
     ui.horizontal(|ui| {
         ui.label("Width");
-        style::choice(ui, "width", 60.0, &mut panel.window, &WINDOWS, |s| format!("{s} s"))
-            .on_hover_text("Time across the strip, s");
+        spans::width(ui, &mut panel.window);
     });
 }
 
@@ -245,13 +223,9 @@ fn measured(ui: &mut Ui, panel: &mut MmodePanel) {
         ui.small("Drag in the strip to measure.");
         return;
     }
-    for (letter, span) in ('A'..='Z').zip(&panel.spans) {
-        ui.monospace(format!(
-            "{letter} {:.1} mm  {:.0} ms",
-            span.millimetres(),
-            span.seconds() * 1e3
-        ));
-        if let (Some(rate), Some(speed)) = (span.per_minute(), span.speed()) {
+    for (letter, span) in panel.spans.lettered() {
+        ui.monospace(format!("{letter} {:.1} mm  {:.0} ms", span.height(), span.seconds() * 1e3));
+        if let (Some(rate), Some(speed)) = (span.per_minute(), span.slope()) {
             ui.monospace(format!("  {rate:.0} /min  {speed:.0} mm/s"));
         }
     }
@@ -275,18 +249,6 @@ fn draw(ui: &Ui, strip: &Strip, panel: &mut MmodePanel, inner: Rect, end: f64) {
     ui.painter().image(texture.id(), inner, all, Color32::WHITE);
 }
 
-/// Draws a measurement of a strip with its letter.
-pub(super) fn marked(ui: &Ui, inner: Rect, ends: [Pos2; 2], letter: char) {
-    let line = Stroke::new(1.5, style::ACCENT);
-    let painter = ui.painter_at(inner);
-    painter.line_segment(ends, line);
-    for end in ends {
-        painter.circle_stroke(end, 4.0, line);
-    }
-    let place = ends[1] + vec2(6.0, -6.0);
-    painter.text(place, Align2::LEFT_BOTTOM, letter, FontId::proportional(12.0), style::ACCENT);
-}
-
 /// Draws the ruler of depths at the right.
 fn depths(ui: &Ui, inner: Rect, depth: f64) {
     let font = FontId::proportional(10.0);
@@ -297,25 +259,6 @@ fn depths(ui: &Ui, inner: Rect, depth: f64) {
         let at = pos2(inner.right() + 6.0, y);
         let align = align[(2.0 * share) as usize];
         (ui.painter()).text(at, align, text, font.clone(), style::FAINT);
-    }
-}
-
-/// Draws the ruler of seconds below a strip.
-pub(super) fn seconds(ui: &Ui, inner: Rect, window: f64, end: f64) {
-    let font = FontId::proportional(10.0);
-    let step = window / 8.0;
-    let first = ((end - window) / step).ceil() as i64;
-    for tick in first..=(end / step).floor() as i64 {
-        let x = inner.right() - inner.width() * ((end - tick as f64 * step) / window) as f32;
-        let long = tick % 4 == 0;
-        let bottom = inner.bottom() + if long { 6.0 } else { 3.0 };
-        let line = Stroke::new(1.0, style::FAINT);
-        (ui.painter()).line_segment([pos2(x, inner.bottom()), pos2(x, bottom)], line);
-        if long {
-            let text = format!("{:.1} s", tick as f64 * step);
-            let at = pos2(x, bottom);
-            (ui.painter()).text(at, Align2::CENTER_TOP, text, font.clone(), style::FAINT);
-        }
     }
 }
 

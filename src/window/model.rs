@@ -22,6 +22,7 @@ mod saving;
 mod settings;
 pub mod sheet;
 pub mod sidecar;
+pub mod span;
 pub mod spectrum;
 pub mod trajectory;
 mod trajectory_state;

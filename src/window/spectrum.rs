@@ -6,15 +6,15 @@ mod measured;
 
 use std::time::Instant;
 
-use egui::{Context, Key, PointerButton, Sense, Ui, vec2};
+use egui::{Context, Key, Sense, Ui, vec2};
 use serde_json::json;
 
 use super::captures::SavedStrip;
 use super::console::controls;
-use super::mmode;
 use super::model::Model;
-use super::model::spectrum::{Slope, SpectrumStrip};
+use super::model::spectrum::SpectrumStrip;
 use super::panel::{Desk, Dock, OpenPanels, Panel, Row};
+use super::spans::{self, Spans};
 use super::style;
 use crate::settings::{Group, Spectral, Words};
 pub(super) use cursor::{gate, mark};
@@ -37,10 +37,6 @@ pub(super) const ROW: Row = Row {
 const WIDEST: usize = 1024;
 /// Width of the controls, points.
 const CONTROLS: f32 = 300.0;
-/// Choices for the width of the strip, s.
-const WINDOWS: [f64; 5] = [1.0, 2.0, 4.0, 8.0, 16.0];
-/// Most measurements at a time: one for each letter.
-const MOST: usize = 26;
 /// Spectra per second of the scene below which a pulse's rise is seen in steps: those of a slow scanner.
 const FEW: f64 = 100.0;
 
@@ -48,10 +44,8 @@ const FEW: f64 = 100.0;
 pub(super) struct SpectrumPanel {
     /// Seconds across the strip.
     window: f64,
-    /// The measurements, oldest first.
-    slopes: Vec<Slope>,
-    /// The last of them is being drawn.
-    drawing: bool,
+    /// What is measured by hand.
+    spans: Spans,
     /// True while traces are drawn, and measured.
     traces: bool,
     traced: Traced,
@@ -62,8 +56,7 @@ impl Default for SpectrumPanel {
     fn default() -> Self {
         Self {
             window: 4.0,
-            slopes: Vec::new(),
-            drawing: false,
+            spans: Spans::default(),
             traces: true,
             traced: Traced::default(),
             drawn: Drawn::default(),
@@ -98,14 +91,14 @@ pub(super) fn saved(model: &Model, panel: &mut SpectrumPanel) -> Option<SavedStr
     panel.traced.follow(strip, &spectral, [end, panel.window], None);
     let spectrogram = strip.even(end, panel.window, WIDEST).shown(probe, &spectral);
     let velocities = &spectrogram.velocities;
-    let measurements = ('A'..='Z').zip(&panel.slopes).map(|(letter, slope)| {
+    let measurements = panel.spans.lettered().map(|(letter, span)| {
         json!({
             "letter": letter,
-            "from_s_mm_per_s": slope.from,
-            "to_s_mm_per_s": slope.to,
-            "seconds": slope.seconds(),
-            "resistive_index": slope.resistive_index(),
-            "acceleration_mm_per_s2": slope.acceleration(),
+            "from_s_mm_per_s": span.from,
+            "to_s_mm_per_s": span.to,
+            "seconds": span.seconds(),
+            "resistive_index": span.resistive_index(),
+            "acceleration_mm_per_s2": span.slope(),
         })
     });
     let facts = json!({
@@ -153,7 +146,7 @@ impl Panel for SpectrumPanel {
         };
         // Of a strip that begins anew nothing is measured.
         if strip.newest().is_none() {
-            self.slopes.clear();
+            self.spans.clear();
         }
     }
 
@@ -181,14 +174,13 @@ impl SpectrumPanel {
     fn controls(&mut self, ui: &mut Ui, desk: &mut Desk<'_>) {
         ui.horizontal(|ui| {
             ui.strong("Spectrum");
-            style::choice(ui, "width", 60.0, &mut self.window, &WINDOWS, |s| format!("{s} s"))
-                .on_hover_text("Time across the strip, s");
+            spans::width(ui, &mut self.window);
             let tip = "Draw the maximum and the mean of what is heard, and measure the beats";
             ui.toggle_value(&mut self.traces, "Trace").on_hover_text(tip);
-            let any = !self.slopes.is_empty();
+            let any = !self.spans.is_empty();
             let tip = "Remove the measurements of the strip";
             if any && ui.small_button("Clear").on_hover_text(tip).clicked() {
-                self.slopes.clear();
+                self.spans.clear();
             }
         });
         egui::ScrollArea::vertical().show(ui, |ui| {
@@ -196,7 +188,7 @@ impl SpectrumPanel {
                 if self.traces {
                     self.traced.list(ui);
                 }
-                measured::slopes(ui, &self.slopes);
+                measured::by_hand(ui, &self.spans);
                 self.remarks(ui, strip, desk.model);
             }
             let (before, now) = (desk.model.settings.clone(), desk.seen.now);
@@ -241,7 +233,7 @@ impl SpectrumPanel {
         let end = end(strip, self.window);
         self.drawn.follow(ui, strip, probe, &spectral, [end, self.window], inner);
         self.drawn.show(ui, inner);
-        mmode::seconds(ui, inner, self.window, end);
+        spans::seconds(ui, inner, self.window, end);
         if self.traces {
             self.traced.follow(strip, &spectral, [end, self.window], Some(now));
             self.traced.draw(ui, &self.drawn, inner, [end, self.window]);
@@ -255,23 +247,9 @@ impl SpectrumPanel {
             let share = (point.x - inner.left()) / inner.width();
             [end - self.window * f64::from(1.0 - share), self.drawn.velocity(inner, point.y)]
         };
-        if response.drag_started_by(PointerButton::Primary) {
-            let origin = ui.input(|i| i.pointer.press_origin());
-            if let Some(from) = origin.map(under).filter(|_| self.slopes.len() < MOST) {
-                self.slopes.push(Slope { from, to: from });
-                self.drawing = true;
-            }
-        }
-        if let (true, Some(slope), Some(point)) =
-            (self.drawing, self.slopes.last_mut(), response.interact_pointer_pos())
-        {
-            slope.to = under(point);
-        }
-        self.drawing &= !response.drag_stopped();
+        self.spans.drag(ui, &response, under);
         response
             .on_hover_text("Drag from the systolic peak to the end of diastole, or along a rise");
-        for (letter, slope) in ('A'..='Z').zip(&self.slopes) {
-            mmode::marked(ui, inner, [at(slope.from), at(slope.to)], letter);
-        }
+        self.spans.show(ui, inner, at);
     }
 }

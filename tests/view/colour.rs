@@ -5,9 +5,10 @@ use serde_json::Value;
 use super::desk::{Desk, Display, Key};
 use super::tools::sidecar;
 use super::{brightness, difference};
+use crate::common::vessel::VESSEL;
 
-/// Blood that flows away from the probe, through a vessel across a small image.
-const SCENE: &str = r#"name = "Vessel"
+/// A small image, before the vessel.
+const PROBE: &str = r#"name = "Vessel"
 background = "muscle"
 
 [probe]
@@ -19,20 +20,6 @@ elevation_layers = 1
 
 [imaging]
 image_height = 400
-
-[[mesh]]
-name = "vessel"
-shape = { cylinder = { radius = 5, length = 100, segments = 48 } }
-tissue = "blood"
-priority = 1
-translate = [0, 0, 20]
-rotate = { axis = [0, 1, 0], angle = "60 deg" }
-
-[[flow]]
-name = "vessel"
-mesh = "vessel"
-line = { from = [0, 0, -50], to = [0, 0, 50] }
-speed = "30 cm/s"
 "#;
 
 /// The part with the image, without the 3D view; its middle.
@@ -46,8 +33,8 @@ const COLOURS: Key = Key::Symbol(0xffc2);
 const CORNERS: [[u8; 3]; 2] = [[92, 176, 196], [208, 212, 216]];
 const WARN: [u8; 3] = [232, 170, 84];
 
-fn open(scene: &str, arguments: &[&str]) -> Option<Desk> {
-    let mut desk = Desk::open(scene, arguments)?;
+fn open(arguments: &[&str]) -> Option<Desk> {
+    let mut desk = Desk::open(&format!("{PROBE}{VESSEL}"), arguments)?;
     desk.wait_for("an image", |d| brightness(&d.grab([200, 100, 300, 400])) > 5.0);
     // The 3D view has tests of its own.
     desk.press(Key::Letter('v'));
@@ -94,7 +81,7 @@ fn what_flows_is_coloured_by_a_key_saved_so_and_costs_nothing_when_off() {
     for on in [false, true] {
         let json = path("times.json");
         let arguments = ["--validate", "--json", &json, "--captures", &captures];
-        let Some(mut desk) = open(SCENE, &arguments) else {
+        let Some(mut desk) = open(&arguments) else {
             return;
         };
         if on {
@@ -142,7 +129,7 @@ fn what_flows_is_coloured_by_a_key_saved_so_and_costs_nothing_when_off() {
 
 #[test]
 fn the_box_is_moved_and_resized_by_the_pointer_and_undone() {
-    let Some(mut desk) = open(SCENE, &["--validate"]) else {
+    let Some(mut desk) = open(&["--validate"]) else {
         return;
     };
     // Blood stands still for it.
@@ -171,7 +158,7 @@ fn the_box_is_moved_and_resized_by_the_pointer_and_undone() {
 #[test]
 fn settings_that_cannot_be_coloured_say_why_and_the_image_goes_on() {
     // Deeper than the pulses of the box have time for.
-    let deep = SCENE.replace("40 mm", "290 mm");
+    let deep = format!("{PROBE}{VESSEL}").replace("40 mm", "290 mm");
     let Some(mut desk) = Desk::open_on(
         match Display::open() {
             Some(display) => display,

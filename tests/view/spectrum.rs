@@ -3,9 +3,10 @@
 use super::brightness;
 use super::desk::{Desk, Key};
 use super::tools::sidecar;
+use crate::common::vessel::VESSEL;
 
-/// Blood that flows away from the probe, through a vessel across a small image, and a gate in its middle.
-const SCENE: &str = r#"name = "Vessel"
+/// A small image with a gate in the middle of the vessel, before which this stands.
+const PROBE: &str = r#"name = "Vessel"
 background = "muscle"
 
 [probe]
@@ -26,20 +27,6 @@ prf = "4 kHz"
 window = "30 ms"
 wall_filter = "50 Hz"
 gain = "45 dB"
-
-[[mesh]]
-name = "vessel"
-shape = { cylinder = { radius = 5, length = 100, segments = 48 } }
-tissue = "blood"
-priority = 1
-translate = [0, 0, 20]
-rotate = { axis = [0, 1, 0], angle = "60 deg" }
-
-[[flow]]
-name = "vessel"
-mesh = "vessel"
-line = { from = [0, 0, -50], to = [0, 0, 50] }
-speed = "30 cm/s"
 "#;
 
 /// The key of the panel: F6.
@@ -63,7 +50,7 @@ fn greys(pixels: &[u8]) -> usize {
 }
 
 fn open(arguments: &[&str]) -> Option<Desk> {
-    let mut desk = Desk::open(SCENE, arguments)?;
+    let mut desk = Desk::open(&format!("{PROBE}{VESSEL}"), arguments)?;
     desk.wait_for("an image", |d| brightness(&d.grab([200, 100, 300, 400])) > 5.0);
     // Room for the strip: neither the 3D view nor the console.
     desk.press(Key::Letter('v'));

@@ -1,4 +1,4 @@
-//! Who is at work in the folder of a data set: each run has a file there for its shard, locked as long as it lives.
+//! Locks of the runs that are at work in the folder of a data set: each has a file there for its shard, as long as it lives.
 
 use std::path::Path;
 

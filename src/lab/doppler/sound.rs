@@ -6,6 +6,7 @@ use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 
 use super::gate::WallFilter;
+use super::spectrum::lowest;
 use crate::settings::Spectral;
 
 /// Samples per second of a sound, which every player takes.
@@ -30,8 +31,7 @@ pub fn sound(spectral: &Spectral, echoes: &[Complex<f64>]) -> Vec<[f64; 2]> {
     let mut planner = FftPlanner::new();
     planner.plan_fft_forward(pulses).process(&mut spectrum);
     // From the lowest frequency on, in which each occurs once: what is between is interpolated as band limits say.
-    let up = if spectral.invert { -spectral.baseline } else { spectral.baseline };
-    let lowest = (up / 2.0 * pulses as f64).round() as i64 - (pulses / 2) as i64;
+    let lowest = lowest(spectral, pulses);
     let back = planner.plan_fft_inverse(samples);
     let direction = |is_heard: &dyn Fn(i64) -> bool| -> Vec<f64> {
         let mut bins = vec![Complex::default(); samples];

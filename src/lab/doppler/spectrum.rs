@@ -9,7 +9,9 @@ use rustfft::{Fft, FftPlanner};
 use super::gate::WallFilter;
 use super::nyquist;
 use crate::probe::Probe;
+use crate::scene::Scene;
 use crate::settings::Spectral;
+use crate::sim::calibration::Calibration;
 
 /// Fewest bins of a spectrum.
 const FEWEST_BINS: usize = 256;
@@ -33,9 +35,7 @@ impl Spectra {
     /// with which they were made.
     pub fn shown(&self, probe: &Probe, spectral: &Spectral) -> Spectrogram {
         let bins = bins(spectral);
-        // The middle of what is shown lies so many bins above that of frequencies.
-        let up = if spectral.invert { -spectral.baseline } else { spectral.baseline };
-        let lowest = (up / 2.0 * bins as f64).round() as i64 - (bins / 2) as i64;
+        let lowest = lowest(spectral, bins);
         let fastest = nyquist(probe, spectral.prf) / spectral.angle.cos();
         let velocity = |j: usize| 2.0 * fastest * (lowest + j as i64) as f64 / bins as f64;
         let mut velocities: Vec<f64> = (0..bins).map(velocity).collect();
@@ -54,6 +54,13 @@ impl Spectra {
         }
         Spectrogram { velocities, times: self.times.clone(), power }
     }
+}
+
+/// Number of the lowest frequency that is told apart, of `bins` that are as many parts of the PRF: what lies below folds over.
+pub(super) fn lowest(spectral: &Spectral, bins: usize) -> i64 {
+    // The middle of what is shown lies so many bins above that of frequencies.
+    let up = if spectral.invert { -spectral.baseline } else { spectral.baseline };
+    (up / 2.0 * bins as f64).round() as i64 - (bins / 2) as i64
 }
 
 /// Pulses of one spectrum.
@@ -169,6 +176,12 @@ impl Analyser {
     pub fn take(&mut self) -> Spectra {
         std::mem::take(&mut self.made)
     }
+}
+
+/// Gain of the image where the gate of a scene lies, dB: what [`greys`] takes.
+pub fn image_gain(scene: &Scene) -> f64 {
+    let calibration = Calibration::new(scene);
+    calibration.tgc_db(scene.spectral.depth) + 20.0 * calibration.display_gain().log10()
 }
 
 /// Grey levels of spectra, 0 to 255: a row for each bin, the highest velocity on top, a column for each spectrum. White has the

@@ -181,39 +181,6 @@ impl Strip {
     }
 }
 
-/// Two points of a strip: seconds and mm of depth.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Span {
-    /// First point.
-    pub from: [f64; 2],
-    /// Second point.
-    pub to: [f64; 2],
-}
-
-impl Span {
-    /// Time between them, s, 0 or more.
-    pub fn seconds(&self) -> f64 {
-        (self.to[0] - self.from[0]).abs()
-    }
-
-    /// Depth between them, mm, 0 or more.
-    pub fn millimetres(&self) -> f64 {
-        (self.to[1] - self.from[1]).abs()
-    }
-
-    /// Events per minute, if they repeat after this time; none where no time lies between.
-    pub fn per_minute(&self) -> Option<f64> {
-        (self.seconds() > 0.0).then(|| 60.0 / self.seconds())
-    }
-
-    /// Speed from the first point to the second, mm/s, positive away from the probe; none where no
-    /// time lies between.
-    pub fn speed(&self) -> Option<f64> {
-        let [seconds, depth] = [self.to[0] - self.from[0], self.to[1] - self.from[1]];
-        (seconds != 0.0).then(|| depth / seconds)
-    }
-}
-
 /// The scanline of `probe` that passes nearest to a point of the image plane, mm.
 pub fn nearest_line(probe: &Probe, lateral: f64, depth: f64) -> u32 {
     let point = glam::DVec3::new(lateral, 0.0, depth);
@@ -232,7 +199,7 @@ pub fn nearest_line(probe: &Probe, lateral: f64, depth: f64) -> u32 {
 mod tests {
     use glam::dvec2;
 
-    use super::{Aim, ROWS, Span, Strip, nearest_line};
+    use super::{Aim, ROWS, Strip, nearest_line};
     use crate::picture::{Pixels, Sector};
     use crate::probe::{Probe, ProbeKind};
 
@@ -330,17 +297,6 @@ mod tests {
             strip.add_image(i as f64, &probe(), SECTOR, &bright_at(25.0));
         }
         assert_eq!(strip.columns.len(), super::KEPT);
-    }
-
-    #[test]
-    fn spans_are_measured() {
-        let span = Span { from: [1.0, 30.0], to: [1.8, 14.0] };
-        assert!((span.seconds() - 0.8).abs() < 1e-12);
-        assert_eq!(span.millimetres(), 16.0);
-        assert!((span.per_minute().unwrap() - 75.0).abs() < 1e-9);
-        assert!((span.speed().unwrap() + 20.0).abs() < 1e-9);
-        let still = Span { to: span.from, ..span };
-        assert_eq!((still.per_minute(), still.speed()), (None, None));
     }
 
     #[test]

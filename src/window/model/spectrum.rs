@@ -118,34 +118,6 @@ impl SpectrumStrip {
     }
 }
 
-/// Two points of a strip of spectra: seconds, and velocity in mm/s.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Slope {
-    /// First point.
-    pub from: [f64; 2],
-    /// Second point.
-    pub to: [f64; 2],
-}
-
-impl Slope {
-    /// Time between them, s, 0 or more.
-    pub fn seconds(&self) -> f64 {
-        (self.to[0] - self.from[0]).abs()
-    }
-
-    /// Resistive index, if the first is the systolic peak and the second the end of diastole; none of a first one at rest.
-    pub fn resistive_index(&self) -> Option<f64> {
-        let [systole, diastole] = [self.from[1], self.to[1]];
-        (systole != 0.0).then(|| (systole - diastole) / systole)
-    }
-
-    /// Change of the velocity over time, mm/s2; none where no time lies between.
-    pub fn acceleration(&self) -> Option<f64> {
-        let [seconds, change] = [self.to[0] - self.from[0], self.to[1] - self.from[1]];
-        (seconds != 0.0).then(|| change / seconds)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -202,14 +174,5 @@ mod tests {
             strip.add(&heard(&Spectral::default(), &[f64::from(i) * 0.125]));
         }
         assert_eq!(strip.columns.len(), 161);
-    }
-
-    #[test]
-    fn slopes_are_measured() {
-        let slope = Slope { from: [0.25, 800.0], to: [0.75, 200.0] };
-        assert_eq!((slope.seconds(), slope.resistive_index()), (0.5, Some(0.75)));
-        assert_eq!(slope.acceleration(), Some(-1200.0));
-        let still = Slope { from: [0.2, 0.0], to: [0.2, 1.0] };
-        assert_eq!((still.acceleration(), still.resistive_index()), (None, None));
     }
 }

@@ -1,12 +1,13 @@
-//! What is measured in the strip of spectra: traces, and slopes that the user draws.
+//! What is measured in the strip of spectra: traces, and what the user measures by hand.
 
 use std::time::{Duration, Instant};
 
 use egui::{Pos2, Rect, Stroke, Ui, pos2};
 
 use super::drawn::Drawn;
-use crate::model::spectrum::{Slope, SpectrumStrip};
+use crate::model::spectrum::SpectrumStrip;
 use crate::settings::Spectral;
+use crate::spans::Spans;
 use crate::style;
 use insonify_lab::doppler::trace::{Measured, Trace, measure, trace};
 
@@ -109,12 +110,12 @@ impl Traced {
     }
 }
 
-/// Lists the slopes that the user has drawn.
-pub(super) fn slopes(ui: &mut Ui, slopes: &[Slope]) {
-    for (letter, slope) in ('A'..='Z').zip(slopes) {
-        let [from, to] = [slope.from[1], slope.to[1]].map(|mm| mm / 10.0);
-        ui.monospace(format!("{letter} {from:.1}, {to:.1} cm/s  {:.0} ms", 1e3 * slope.seconds()));
-        if let (Some(index), Some(change)) = (slope.resistive_index(), slope.acceleration()) {
+/// Lists what the user has measured by hand.
+pub(super) fn by_hand(ui: &mut Ui, spans: &Spans) {
+    for (letter, span) in spans.lettered() {
+        let [from, to] = [span.from[1], span.to[1]].map(|mm| mm / 10.0);
+        ui.monospace(format!("{letter} {from:.1}, {to:.1} cm/s  {:.0} ms", 1e3 * span.seconds()));
+        if let (Some(index), Some(change)) = (span.resistive_index(), span.slope()) {
             ui.monospace(format!("  RI {index:.2}  {:.1} m/s2", change / 1e3));
         }
     }

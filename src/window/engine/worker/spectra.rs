@@ -7,10 +7,9 @@ use crate::model::Order;
 use crate::model::spectrum::Heard;
 use crate::probe::Probe;
 use crate::settings::Spectral;
-use crate::sim::calibration::Calibration;
 use crate::sim::{SimError, Simulator, Tracer, machine};
 use insonify_lab::doppler::gate;
-use insonify_lab::doppler::spectrum::{Analyser, Spectra, pulses};
+use insonify_lab::doppler::spectrum::{Analyser, Spectra, image_gain, pulses};
 
 /// Longest time of the scene, s, for which pulses follow those before; after a rest the strip goes on with a gap.
 const LONGEST: f64 = 0.5;
@@ -121,9 +120,7 @@ impl Worker {
             }
         }
         gate.heard = Some((probe.clone(), spectral.clone(), until));
-        let calibration = Calibration::new(&self.scene);
-        let undone = calibration.tgc_db(spectral.depth) + 20.0 * calibration.display_gain().log10();
-        Ok(Some(Heard { probe, spectral, undone, spectra }))
+        Ok(Some(Heard { probe, spectral, undone: image_gain(&self.scene), spectra }))
     }
 }
 
