@@ -3,7 +3,10 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
-const SCENE: &str = r#"
+use crate::common::vessel::VESSEL;
+
+/// The table of the probe, before the vessel.
+const PROBE: &str = r#"
 name = "vessel"
 background = "muscle"
 
@@ -16,25 +19,11 @@ elevation_layers = 3
 
 [imaging]
 image_height = 200
-
-[[mesh]]
-name = "vessel"
-shape = { cylinder = { radius = 5, length = 100, segments = 48 } }
-tissue = "blood"
-priority = 1
-translate = [0, 0, 20]
-rotate = { axis = [0, 1, 0], angle = "60 deg" }
-
-[[flow]]
-name = "vessel"
-mesh = "vessel"
-line = { from = [0, 0, -50], to = [0, 0, 50] }
-speed = "30 cm/s"
 "#;
 
 fn render(folder: &Path, name: &str, more: &[&str]) -> Output {
     let scene = folder.join("vessel.toml");
-    std::fs::write(&scene, SCENE).expect("written");
+    std::fs::write(&scene, format!("{PROBE}{VESSEL}")).expect("written");
     let mut command = Command::new(env!("CARGO_BIN_EXE_insonify"));
     command.arg("render").arg(scene).arg("-o").arg(folder.join(name)).args(more);
     command.output().expect("the program starts")
@@ -160,6 +149,49 @@ fn a_gate_is_seen_measured_and_heard() {
     // 2 f v cos(60 deg) / c of the preset's 7.6 MHz.
     let expected = 2.0 * 7.6e6 * 0.3 * 0.5 / 1540.0 * 0.5;
     assert!((0.8..1.15).contains(&(up as f64 / expected)), "{up} of {expected}");
+}
+
+/// A body that turns back at 0.25 s: also in the second of two images of that time, which are shown one after the other.
+#[test]
+fn tissue_has_the_velocity_of_the_images_time_however_late_it_is_shown() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let body = r#"
+[[transform]]
+name = "way"
+motion = { kind = "sine", period = "1 s", translate = [0, 0, 3] }
+
+[[mesh]]
+name = "body"
+parent = "way"
+shape = { box = { size = [60, 40, 36] } }
+tissue = "liver"
+translate = [0, 0, 20]
+"#;
+    let scene = folder.join("body.toml");
+    std::fs::write(&scene, format!("{PROBE}{body}")).expect("written");
+    let median = |time: &str| -> f64 {
+        let file = folder.join("packet.npz");
+        let mut command = Command::new(env!("CARGO_BIN_EXE_insonify"));
+        command.arg("render").arg(&scene).arg("-o").arg(folder.join("a.png"));
+        command.args(["--mode", "tdi", "--frames", "2", "--time", time, "--packet"]).arg(&file);
+        let out = command.output().expect("the program starts");
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        let archive = std::fs::File::open(&file).expect("written");
+        let mut archive = zip::ZipArchive::new(archive).expect("an archive");
+        let mut bytes = Vec::new();
+        let mut array = archive.by_name("velocity.npy").expect("an array");
+        std::io::copy(&mut array, &mut bytes).expect("read");
+        let words = bytes[128..].chunks_exact(4);
+        let mut found: Vec<f32> =
+            words.map(|w| f32::from_le_bytes(w.try_into().expect("four"))).collect();
+        found.sort_by(f32::total_cmp);
+        found[found.len() / 2].into()
+    };
+    let (turning, coming) = (median("0.25"), median("0.35"));
+    assert!(turning.abs() < 1.0, "{turning}");
+    // Towards the probe: 2 pi 3 mm a second times the cosine of 0.7 pi.
+    assert!((coming - 11.08).abs() < 1.0, "{coming}");
 }
 
 #[test]

@@ -10,6 +10,7 @@ mod common {
     pub mod skip;
     pub mod timestamps;
     pub mod tracers;
+    pub mod vessel;
 }
 
 mod acquire;

@@ -26,9 +26,9 @@ mod moments;
 mod spectrum;
 mod strained;
 
-use film::Film;
+use film::{Coloured, Film};
 use labels::LabelFiles;
-use mode::Mode;
+use mode::{Mode, Product};
 use moments::{Moment, groups, moments, pace};
 
 /// Frames per second of an animation whose scene time stands still.
@@ -120,18 +120,18 @@ pub fn run(args: &Render) -> Result<()> {
     let moments = moments(args, &scene)?;
     let frames = u32::try_from(moments.len()).expect("no more than can be asked for");
     film::check(&output, frames)?;
-    let wave = args.mode.and_then(Mode::wave);
-    if let Some(wave) = wave {
-        scene.spectral.wave = wave;
-    }
-    match (wave, args.mode.and_then(Mode::colours)) {
-        (Some(_), _) => spectrum::check(args, &output, &scene)?,
-        (None, Some(colours)) => {
+    let product = args.mode.map(Mode::product);
+    match product {
+        Some(Product::Spectra(wave)) => {
+            scene.spectral.wave = wave;
+            spectrum::check(args, &output, &scene)?;
+        }
+        Some(Product::Coloured(colours)) => {
             spectrum::check_silent(args)?;
             film::check_colour(&output)?;
             coloured::check(&scene, colours)?;
         }
-        (None, None) => {}
+        None => {}
     }
     if let Some(packet) = &args.packet {
         coloured::check_packet(packet)?;
@@ -146,7 +146,7 @@ pub fn run(args: &Render) -> Result<()> {
         args.common.stage(&mut scene, &library)?;
 
     let sidecar = sidecar(args, &output, &scene, &of_file, &device, tracer)?;
-    if wave.is_some() {
+    if matches!(product, Some(Product::Spectra(_))) {
         let (timings, mut said) =
             spectrum::write(args, &output, &mut simulator, &mut scene, sidecar)?;
         if let Some(file) = &args.json {
@@ -345,7 +345,10 @@ fn simulate(
     let mut timings = Vec::new();
     let mut unseen = scene.masks_off_the_image();
     // Packets are made one by one, each behind its image.
-    let colours = args.mode.and_then(Mode::colours);
+    let colours = match args.mode.map(Mode::product) {
+        Some(Product::Coloured(colours)) => Some(colours),
+        _ => None,
+    };
     let at_once = if colours.is_some() { 1 } else { simulator.most_shots() };
     for group in groups(&moments, scene, at_once) {
         reload(simulator, library);
@@ -368,7 +371,9 @@ fn simulate(
             }
             let last = index + 1 == moments.len();
             let packet = args.packet.as_deref().filter(|_| last);
-            film.add(index as u32, simulator, scene, colours.map(|mode| (mode, packet)))?;
+            let seconds = moments[index].seconds;
+            let coloured_by = colours.map(|colours| Coloured { colours, seconds, packet });
+            film.add(index as u32, simulator, scene, coloured_by)?;
             progress.done(index as u32 + 1);
         }
         let took = simulator.wait().into_diagnostic()?.pop().unwrap_or_default();

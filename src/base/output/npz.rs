@@ -22,6 +22,13 @@ pub struct Entry<'a> {
     pub bytes: &'a [u8],
 }
 
+impl<'a> Entry<'a> {
+    /// An array of 32-bit floats, little-endian.
+    pub fn floats(name: &str, shape: &'a [usize], bytes: &'a [u8]) -> Self {
+        Self { name: name.to_owned(), element: Element::Float, shape, bytes }
+    }
+}
+
 /// Writes arrays, and texts by their file names, whole or not at all. The same content makes the same bytes.
 ///
 /// # Panics

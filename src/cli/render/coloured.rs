@@ -8,7 +8,6 @@ use serde_json::{Value, json};
 use super::mode::Colours;
 use crate::cli::common;
 use insonify::doppler;
-use insonify::output::npy::Element;
 use insonify::output::npz::{self, Entry};
 use insonify::scene::Scene;
 use insonify::sim::{ColourMode, Correlation, Packet, Simulator};
@@ -49,7 +48,8 @@ pub fn check_packet(file: &Path) -> Result<()> {
     common::writable(file)
 }
 
-/// The last image of the simulator, which is that of `seconds`, in colour, RGBA, and what is said of it. The packet goes into `file`, where one is given.
+/// The last image of the simulator, which is that of `seconds`, in colour, RGBA, and what is said of it. The packet goes into
+/// `file`, where one is given.
 pub fn coloured(
     simulator: &mut Simulator,
     scene: &mut Scene,
@@ -106,21 +106,15 @@ fn write(
     let depth: Vec<f32> = packet.samples.clone().map(|k| (f64::from(k) * pitch) as f32).collect();
     let map = [packet.lines.len(), packet.samples.len()];
     let all = [times.len(), map[0], map[1], 2];
-    let entry = |name: &str, shape, bytes| Entry {
-        name: name.to_owned(),
-        element: Element::Float,
-        shape,
-        bytes,
-    };
     npz::write(
         file,
         &[
-            entry("iq", &all, bytemuck::cast_slice(echoes)),
-            entry("velocity", &map, bytemuck::cast_slice(&velocity)),
-            entry("variance", &map, bytemuck::cast_slice(&variance)),
-            entry("power", &map, bytemuck::cast_slice(&power)),
-            entry("times", &[times.len()], bytemuck::cast_slice(&times)),
-            entry("depth", &[depth.len()], bytemuck::cast_slice(&depth)),
+            Entry::floats("iq", &all, bytemuck::cast_slice(echoes)),
+            Entry::floats("velocity", &map, bytemuck::cast_slice(&velocity)),
+            Entry::floats("variance", &map, bytemuck::cast_slice(&variance)),
+            Entry::floats("power", &map, bytemuck::cast_slice(&power)),
+            Entry::floats("times", &[times.len()], bytemuck::cast_slice(&times)),
+            Entry::floats("depth", &[depth.len()], bytemuck::cast_slice(&depth)),
         ],
         &[("packet.json", &said.to_string())],
     )

@@ -44,6 +44,17 @@ pub struct Film {
     _held: Option<Hold>,
 }
 
+/// How a frame is coloured.
+#[derive(Clone, Copy)]
+pub struct Coloured<'p> {
+    /// Source of the colours.
+    pub colours: Colours,
+    /// Time of the scene in the frame, s; frames may be shown at others.
+    pub seconds: f64,
+    /// File for what they were made of.
+    pub packet: Option<&'p Path>,
+}
+
 enum Reel {
     Images(Images),
     Loop(film::Film),
@@ -151,8 +162,7 @@ impl Film {
         Ok(Self { shown, times, ras_from_world, reel, sidecar, frames: Vec::new(), _held: held })
     }
 
-    /// Adds the last frame of the simulator, the one of this number, coloured by a packet of its own if a mode is given; the packet is
-    /// written to the file beside the mode.
+    /// Adds the last frame of the simulator, the one of this number, in colour where it says so.
     ///
     /// # Errors
     /// An error of the device, of the format or of the file system.
@@ -161,13 +171,13 @@ impl Film {
         index: u32,
         simulator: &mut Simulator,
         scene: &mut Scene,
-        coloured_by: Option<(Colours, Option<&Path>)>,
+        coloured_by: Option<Coloured<'_>>,
     ) -> Result<()> {
         let (width, height, mut rgba) = simulator.pixels().into_diagnostic()?;
         let area = area(simulator);
         let mut said = None;
-        if let Some((colours, packet)) = coloured_by {
-            let at = (index, self.times[index as usize]);
+        if let Some(Coloured { colours, seconds, packet }) = coloured_by {
+            let at = (index, seconds);
             let (coloured, facts) = match colours {
                 Colours::Doppler(mode) => coloured(simulator, scene, mode, at, packet)?,
                 Colours::Strain => strained(simulator, scene, at, packet)?,

@@ -3,7 +3,7 @@
 use insonify::settings::Wave;
 use insonify::sim::ColourMode;
 
-/// Doppler modes.
+/// Modes besides the image alone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Mode {
     /// Velocity in colours over the image.
@@ -12,7 +12,7 @@ pub enum Mode {
     Power,
     /// Velocity of tissue in colours over the image.
     Tdi,
-    /// How tissue is stretched and compressed, in colours over the image.
+    /// Strain of tissue in colours over the image.
     Strain,
     /// Pulsed wave: spectra of a gate against time.
     Pw,
@@ -20,7 +20,16 @@ pub enum Mode {
     Cw,
 }
 
-/// What colours an image.
+/// What a mode makes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Product {
+    /// Images in colour.
+    Coloured(Colours),
+    /// Spectra of a recording.
+    Spectra(Wave),
+}
+
+/// Source of the colours over an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Colours {
     /// A packet of pulses.
@@ -30,23 +39,16 @@ pub enum Colours {
 }
 
 impl Mode {
-    /// The colours over an image; none of a mode without one.
-    pub fn colours(self) -> Option<Colours> {
+    /// What it makes.
+    pub fn product(self) -> Product {
+        let doppler = |mode| Product::Coloured(Colours::Doppler(mode));
         match self {
-            Self::Color => Some(Colours::Doppler(ColourMode::Color)),
-            Self::Power => Some(Colours::Doppler(ColourMode::Power)),
-            Self::Tdi => Some(Colours::Doppler(ColourMode::Tissue)),
-            Self::Strain => Some(Colours::Strain),
-            Self::Pw | Self::Cw => None,
-        }
-    }
-
-    /// How a spectral mode listens; none of one with an image.
-    pub fn wave(self) -> Option<Wave> {
-        match self {
-            Self::Color | Self::Power | Self::Tdi | Self::Strain => None,
-            Self::Pw => Some(Wave::Pulsed),
-            Self::Cw => Some(Wave::Continuous),
+            Self::Color => doppler(ColourMode::Color),
+            Self::Power => doppler(ColourMode::Power),
+            Self::Tdi => doppler(ColourMode::Tissue),
+            Self::Strain => Product::Coloured(Colours::Strain),
+            Self::Pw => Product::Spectra(Wave::Pulsed),
+            Self::Cw => Product::Spectra(Wave::Continuous),
         }
     }
 }

@@ -8,18 +8,16 @@ use serde_json::{Map, Value, json};
 
 use super::Render;
 use crate::cli::common::{self, Progress};
-use insonify::doppler::spectrum::{Analyser, Spectrogram, greys};
+use insonify::doppler::spectrum::{Analyser, Spectrogram, greys, image_gain};
 use insonify::doppler::trace::{Measured, Trace, measure, trace};
 use insonify::doppler::{gate, nyquist, sound};
 use insonify::gpu::FrameTimings;
 use insonify::output;
 use insonify::output::files;
-use insonify::output::npy::Element;
 use insonify::output::npz::{self, Entry};
 use insonify::scene::Scene;
 use insonify::settings::Words;
 use insonify::sim::Simulator;
-use insonify::sim::calibration::Calibration;
 
 /// Echoes recorded between two steps of the progress.
 const STEP: usize = 500;
@@ -164,9 +162,7 @@ fn facts(scene: &Scene, made: &Spectrogram, traces: &Trace, measured: Option<Mea
 }
 
 fn write_picture(output: &Path, scene: &Scene, made: &Spectrogram) -> std::io::Result<()> {
-    let calibration = Calibration::new(scene);
-    let gain = calibration.tgc_db(scene.spectral.depth) + 20.0 * calibration.display_gain().log10();
-    let mut pixels = greys(&scene.spectral, made, gain);
+    let mut pixels = greys(&scene.spectral, made, image_gain(scene));
     let (width, height) = (made.times.len(), made.velocities.len());
     // The baseline, where it is within the picture.
     let zero = -made.velocities[0] / made.step();
@@ -203,11 +199,6 @@ fn write_arrays(
         ("maximum", &all[..1], bytemuck::cast_slice(&maximum)),
         ("mean", &all[..1], bytemuck::cast_slice(&mean)),
     ];
-    let entries = parts.map(|(name, shape, bytes)| Entry {
-        name: name.to_owned(),
-        element: Element::Float,
-        shape,
-        bytes,
-    });
+    let entries = parts.map(|(name, shape, bytes)| Entry::floats(name, shape, bytes));
     npz::write(file, &entries, &[("packet.json", said)])
 }

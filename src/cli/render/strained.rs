@@ -6,10 +6,9 @@ use miette::{IntoDiagnostic, Result, miette};
 use serde_json::{Value, json};
 
 use insonify::doppler;
-use insonify::output::npy::Element;
 use insonify::output::npz::{self, Entry};
 use insonify::scene::Scene;
-use insonify::settings::{Doppler, VelocityMap};
+use insonify::settings::{Doppler, VelocityMap, WallFilter};
 use insonify::sim::Simulator;
 use insonify::strain::{Deformation, deformation};
 
@@ -36,9 +35,14 @@ pub fn strained(
     let before = echoes(simulator, seconds - strain.interval, index ^ BEFORE)?;
     let after = echoes(simulator, seconds, index)?;
     let found = deformation(&scene.probe, &strain, [&before, &after]);
-    // All greys are coloured; the baseline of velocities is none of strains.
-    let map = VelocityMap::Velocity;
-    let colours = Doppler { priority: 1.0, baseline: 0.0, map, ..scene.doppler.clone() };
+    // Nothing is filtered off, all greys are coloured, and the baseline of velocities is none of strains.
+    let colours = Doppler {
+        wall_filter: WallFilter::Off,
+        priority: 1.0,
+        baseline: 0.0,
+        map: VelocityMap::Velocity,
+        ..scene.doppler.clone()
+    };
     let around = doppler::packet(&scene.probe, &colours);
     let (lines, samples) = (around.lines, around.samples);
     let share = |at: usize| {
@@ -83,11 +87,7 @@ fn write(file: &Path, scene: &Scene, found: &Deformation, said: &Value) -> std::
         ("likeness", &map, &found.likeness),
         ("depth", &along, &depth),
     ];
-    let entries = parts.map(|(name, shape, values)| Entry {
-        name: name.to_owned(),
-        element: Element::Float,
-        shape,
-        bytes: bytemuck::cast_slice(values),
-    });
+    let entries =
+        parts.map(|(name, shape, values)| Entry::floats(name, shape, bytemuck::cast_slice(values)));
     npz::write(file, &entries, &[("packet.json", &said.to_string())])
 }
