@@ -20,7 +20,7 @@ def balls(dtype=np.int64):
 
 AFFINE = np.diag([2.0, 2.0, 2.0, 1.0])
 AFFINE[:3, 3] = [-50, -40, 100]
-NAMES = {1: "body", 5: "liver", 7: "gallbladder"}
+NAMES = {1: "body", 5: "liver_segment", 7: "gallbladder"}
 
 
 @pytest.mark.parametrize("dtype", [np.int64, np.uint16, np.float64, np.uint8])
@@ -28,8 +28,8 @@ def test_an_array_becomes_a_scene(tmp_path, dtype):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         scene = insonify.import_labels(balls(dtype), AFFINE, NAMES, folder=tmp_path / "made")
-    assert scene.meshes == ["skin", "liver", "gallbladder"]
-    assert {scene[f"mesh.{name}.tissue"] for name in ("liver", "gallbladder")} == {"liver", "bile"}
+    assert scene.meshes == ["skin", "liver_segment", "gallbladder"]
+    assert {scene[f"mesh.{name}.tissue"] for name in ("liver_segment", "gallbladder")} == {"liver", "bile"}
     with insonify.Simulator(scene, quality="draft") as simulator:
         assert simulator.frame().bmode.max() > 60
 
@@ -38,7 +38,7 @@ def test_it_lies_where_the_affine_says(tmp_path):
     def place(name, **how):
         folder = tmp_path / name
         insonify.import_labels(balls(), AFFINE, NAMES, folder=folder, **how)
-        text = (folder / "meshes/liver.obj").read_text()
+        text = (folder / "meshes/liver_segment.obj").read_text()
         return np.array([line.split()[1:4] for line in text.splitlines() if line.startswith("v ")], float).mean(0)
 
     ras = AFFINE[:3, :3] @ [15, 20, 15] + AFFINE[:3, 3]
@@ -51,8 +51,10 @@ def test_what_is_to_be_said_is_warned_of(tmp_path):
         insonify.import_labels(balls(), AFFINE, folder=tmp_path / "nameless")
     with pytest.warns(UserWarning, match="spleen: has no voxel"):
         insonify.import_labels(balls(), AFFINE, {**NAMES, 9: "spleen"}, folder=tmp_path / "more")
+    with pytest.warns(UserWarning, match="liver: 7.2 ml, and adults have 1400 to 1800 ml"):
+        insonify.import_labels(balls(), AFFINE, {**NAMES, 5: "liver"}, folder=tmp_path / "small")
     # A sequence begins with what 0 is called.
-    listed = ["background", "body", "a", "b", "c", "liver", "d", "gallbladder"]
+    listed = ["background", "body", "a", "b", "c", "liver_segment", "d", "gallbladder"]
     with pytest.warns(UserWarning, match="d: has no voxel"):
         scene = insonify.import_labels(balls(), AFFINE, listed, folder=tmp_path / "listed")
     assert "gallbladder" in scene.meshes
