@@ -49,8 +49,10 @@ enum Command {
         #[arg(long, value_enum, default_value = "standard")]
         size: Extent,
     },
-    /// Runs every kernel on every case; fails where one differs from its twin.
+    /// Runs kernels on every case; fails where one differs from its twin.
     Check {
+        /// Names of kernels, see `list` [default: all].
+        names: Vec<String>,
         /// Cases [default: all].
         #[arg(long = "case", value_enum)]
         cases: Vec<Case>,
@@ -98,8 +100,13 @@ fn program() -> Result<ExitCode> {
             };
             run(&device, &library, subject, size, input.as_deref(), output.as_deref())?
         }
-        Command::Check { cases } if cases.is_empty() => check(&device, &library, &Case::ALL)?,
-        Command::Check { cases } => check(&device, &library, &cases)?,
+        Command::Check { names, cases } => {
+            let all = SUBJECTS.iter().map(Ok).collect();
+            let named = || names.iter().map(|name| find(name, &library)).collect();
+            let subjects: Result<Vec<_>> = if names.is_empty() { all } else { named() };
+            let cases = if cases.is_empty() { &Case::ALL[..] } else { &cases };
+            check(&device, &library, &subjects?, cases)?
+        }
         Command::Compile => compile(&device, &library),
     };
     let messages = device.validation_messages();
@@ -184,9 +191,14 @@ fn run(
     Ok(passed)
 }
 
-fn check(device: &Arc<Device>, library: &Library, cases: &[Case]) -> Result<bool> {
+fn check(
+    device: &Arc<Device>,
+    library: &Library,
+    subjects: &[&Subject],
+    cases: &[Case],
+) -> Result<bool> {
     let mut passed = true;
-    for subject in &SUBJECTS {
+    for subject in subjects {
         for kernel in kernels(device, library, subject)? {
             for &case in cases {
                 let job = (subject.job)(case, Size::Small);

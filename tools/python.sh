@@ -7,7 +7,7 @@
 set -eu
 cd "$(dirname "$0")/.."
 python=target/python/bin/python
-packages=(numpy==2.4.6 pytest==9.2.0 mypy==2.4.1 ray==2.60.0 gymnasium==1.4.0 h5py==3.16.0 webdataset==1.0.2 pyuff_ustb==3.0.0 matplotlib tqdm)
+packages=(numpy==2.4.6 pytest==9.2.0 pytest-xdist==3.8.0 mypy==2.4.1 ray==2.60.0 gymnasium==1.4.0 h5py==3.16.0 webdataset==1.0.2 pyuff_ustb==3.0.0 matplotlib tqdm)
 wanted=target/python/packages.txt
 if [ ! -f "$wanted" ] || [ "$(cat "$wanted")" != "${packages[*]}" ]; then
   made() {
@@ -25,4 +25,4 @@ fi
 cargo build --features "${FEATURES:-}" --lib --bin insonify
 cp target/debug/lib_insonify.so python/insonify/_insonify.abi3.so
 "$python" -m mypy --no-error-summary --cache-dir target/mypy python/insonify
-PYTHONPATH=$PWD/python "$python" -m pytest -q -rfEs -p no:cacheprovider python/tests "$@"
+PYTHONPATH=$PWD/python "$python" -m pytest -q -rfEs -n auto -p no:cacheprovider python/tests "$@"

@@ -38,7 +38,7 @@ def test_it_lies_where_the_affine_says(tmp_path):
     def place(name, **how):
         folder = tmp_path / name
         insonify.import_labels(balls(), AFFINE, NAMES, folder=folder, **how)
-        text = (folder / "meshes/liver_segment.obj").read_text()
+        text = (folder / "meshes/liver-segment.obj").read_text()
         return np.array([line.split()[1:4] for line in text.splitlines() if line.startswith("v ")], float).mean(0)
 
     ras = AFFINE[:3, :3] @ [15, 20, 15] + AFFINE[:3, 3]

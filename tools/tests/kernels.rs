@@ -99,6 +99,31 @@ fn a_machine_without_a_driver_is_told_what_to_install() {
     );
 }
 
+/// The names of all kernels in two parts of about equally much SPIR-V.
+fn halves() -> [Vec<String>; 2] {
+    let listed = kernels(&["list"]).output().expect("the program starts");
+    let listed = text(&listed.stdout);
+    let library = Library::embedded();
+    // A line for each kernel, with its variants, and indented ones that say more of it.
+    let lines = listed.lines().filter(|line| !line.starts_with(' '));
+    let mut all: Vec<(usize, &str)> = lines
+        .filter_map(|line| {
+            let mut words = line.split_whitespace();
+            let name = words.next()?;
+            Some((words.map(|stem| library.words(stem).len()).sum(), name))
+        })
+        .collect();
+    assert!(all.len() > 20, "{listed}");
+    all.sort_unstable();
+    let mut halves = [(0, Vec::new()), (0, Vec::new())];
+    for (size, name) in all.into_iter().rev() {
+        let half = halves.iter_mut().min_by_key(|half| half.0).expect("two");
+        half.0 += size;
+        half.1.push(name.to_owned());
+    }
+    halves.map(|half| half.1)
+}
+
 #[test]
 fn kernels_agree_with_their_twins_on_a_second_driver() {
     let manifest = root().join("target/second-driver/vk_swiftshader_icd.json");
@@ -106,18 +131,26 @@ fn kernels_agree_with_their_twins_on_a_second_driver() {
         let why = "no second driver in target/second-driver (./tools/setup.sh unpacks one)";
         return skip(Lacking::Tool, why);
     }
-    let mut command = kernels(&["check", "--validate"]);
-    if std::env::var_os("INSONIFY_LONG").is_none() {
-        // Where drivers differ most; a long run has all.
-        command.args(["--case", "random", "--case", "not-finite"]);
+    // Nearly all of the time that driver compiles, one kernel at a time: two processes take half of it.
+    let half = |names: &Vec<String>| {
+        let mut command = kernels(&["check", "--validate"]);
+        command.args(names);
+        if std::env::var_os("INSONIFY_LONG").is_none() {
+            // Where drivers differ most; a long run has all.
+            command.args(["--case", "random", "--case", "not-finite"]);
+        }
+        // The second name is that of loaders before 1.3.207.
+        command.env("VK_DRIVER_FILES", &manifest).env("VK_ICD_FILENAMES", &manifest);
+        command.stdout(Stdio::piped()).stderr(Stdio::piped());
+        command.spawn().expect("the program starts")
+    };
+    for child in halves().each_ref().map(half) {
+        let out = child.wait_with_output().expect("it ends");
+        let said = text(&out.stdout) + &text(&out.stderr);
+        assert!(out.status.success(), "{said}");
+        assert!(said.starts_with("SwiftShader"), "{said}");
+        assert!(!said.contains("WRONG"), "{said}");
     }
-    // The second name is that of loaders before 1.3.207.
-    command.env("VK_DRIVER_FILES", &manifest).env("VK_ICD_FILENAMES", &manifest);
-    let out = command.output().expect("the program starts");
-    let said = text(&out.stdout) + &text(&out.stderr);
-    assert!(out.status.success(), "{said}");
-    assert!(said.starts_with("SwiftShader"), "{said}");
-    assert!(!said.contains("WRONG"), "{said}");
 }
 
 /// A driver that cannot translate a kernel may end the process: LLVM 19 did so on `shadow_query`, for vectors of four

@@ -1,6 +1,6 @@
 //! Displacements on a grid from those of surfaces, by conjugate gradients.
 
-use glam::{DAffine3, DMat3, DVec3, UVec3};
+use glam::{DAffine3, DMat3, DVec3, IVec3, UVec3};
 
 use super::Grid;
 use crate::scene::Mesh;
@@ -43,11 +43,19 @@ pub(super) struct Solver<'a> {
     grid: &'a Grid,
     patches: &'a [Patch<'a>],
     samples: Vec<SurfaceSample>,
-    /// Weights of the 27 nodes around each node; 0 for those outside the grid.
-    stencil: Vec<[f64; 27]>,
+    matrix: Matrix,
     centre: DVec3,
     /// Inverse of the samples' second moments about `centre`.
     moments: DMat3,
+}
+
+/// A sparse matrix over the nodes, row by row.
+struct Matrix {
+    /// Where each row's entries begin, and where the last row's end.
+    starts: Vec<u32>,
+    /// Columns and values.
+    entries: Vec<(u32, f64)>,
+    diagonal: Vec<f64>,
 }
 
 impl<'a> Solver<'a> {
@@ -65,42 +73,8 @@ impl<'a> Solver<'a> {
         // A flat patch has no second moment across it; without this term the matrix would be singular.
         let trace = moments.x_axis.x + moments.y_axis.y + moments.z_axis.z;
         moments += DMat3::from_diagonal(DVec3::splat(1e-9 * trace + f64::MIN_POSITIVE));
-        let mut solver = Self {
-            grid,
-            patches,
-            stencil: vec![[0.0; 27]; grid.nodes()],
-            samples,
-            centre,
-            moments: moments.inverse(),
-        };
-        solver.assemble();
-        solver
-    }
-
-    fn assemble(&mut self) {
-        for s in &self.samples {
-            for (a, wa) in s.weights.iter().enumerate() {
-                let row = self.grid.index(s.cell + corner(a));
-                for (b, wb) in s.weights.iter().enumerate() {
-                    let step = corner(b).as_ivec3() - corner(a).as_ivec3();
-                    self.stencil[row][around(step)] += s.area * wa * wb;
-                }
-            }
-        }
-        let stiffness = STIFFNESS * self.grid.spacing * self.grid.spacing;
-        for index in 0..self.grid.nodes() {
-            let node = self.grid.node(index);
-            for axis in 0..3 {
-                let mut step = glam::IVec3::ZERO;
-                step[axis] = 1;
-                let below = (node[axis] > 0).then_some(-step);
-                let above = (node[axis] + 1 < self.grid.size[axis]).then_some(step);
-                for step in below.into_iter().chain(above) {
-                    self.stencil[index][around(glam::IVec3::ZERO)] += stiffness;
-                    self.stencil[index][around(step)] -= stiffness;
-                }
-            }
-        }
+        let matrix = Matrix::of(grid, &samples);
+        Self { grid, patches, samples, matrix, centre, moments: moments.inverse() }
     }
 
     /// Displacement of every node from keyframe 0 to `keyframe`, mm.
@@ -132,28 +106,11 @@ impl<'a> Solver<'a> {
         total.map(|v| v.as_vec3().to_array()).collect()
     }
 
-    fn apply(&self, u: &[DVec3], out: &mut [DVec3]) {
-        let n = self.grid.size.as_ivec3();
-        let [y, z] = [n.x, n.x * n.y];
-        for (i, (row, out)) in self.stencil.iter().zip(out).enumerate() {
-            let mut sum = DVec3::ZERO;
-            for (k, &w) in row.iter().enumerate() {
-                if w != 0.0 {
-                    let k = k as i32;
-                    let step = k % 3 - 1 + (k / 3 % 3 - 1) * y + (k / 9 - 1) * z;
-                    sum += w * u[(i as i32 + step) as usize];
-                }
-            }
-            *out = sum;
-        }
-    }
-
     /// Conjugate gradients with Jacobi's preconditioner, all three components at once.
     fn solve(&self, load: Vec<DVec3>) -> Vec<DVec3> {
         let inner = |a: &[DVec3], b: &[DVec3]| a.iter().zip(b).map(|(a, b)| a * b).sum::<DVec3>();
         let precondition = |r: &[DVec3]| -> Vec<DVec3> {
-            let pairs = r.iter().zip(&self.stencil);
-            pairs.map(|(r, row)| r / row[around(glam::IVec3::ZERO)]).collect()
+            r.iter().zip(&self.matrix.diagonal).map(|(r, d)| r / *d).collect()
         };
         let mut u = vec![DVec3::ZERO; load.len()];
         let mut residual = load;
@@ -165,7 +122,7 @@ impl<'a> Solver<'a> {
             if norm.cmple(enough).all() {
                 break;
             }
-            self.apply(&direction, &mut image);
+            self.matrix.apply(&direction, &mut image);
             let step = quotient(norm, inner(&direction, &image));
             for i in 0..u.len() {
                 u[i] += step * direction[i];
@@ -183,6 +140,62 @@ impl<'a> Solver<'a> {
     }
 }
 
+impl Matrix {
+    /// The misfit on the samples and the energy of the membrane.
+    fn of(grid: &Grid, samples: &[SurfaceSample]) -> Self {
+        let stencil = stencil(grid, samples);
+        let n = grid.size.as_ivec3();
+        let [y, z] = [n.x, n.x * n.y];
+        let step =
+            |k: usize| k as i32 % 3 - 1 + (k as i32 / 3 % 3 - 1) * y + (k as i32 / 9 - 1) * z;
+        let steps: [i32; 27] = std::array::from_fn(step);
+        let (mut starts, mut entries) = (vec![0], Vec::with_capacity(8 * stencil.len()));
+        for (i, row) in stencil.iter().enumerate() {
+            let there = row.iter().zip(steps).filter(|(w, _)| **w != 0.0);
+            entries.extend(there.map(|(w, step)| ((i as i32 + step) as u32, *w)));
+            starts.push(entries.len() as u32);
+        }
+        let diagonal = stencil.iter().map(|row| row[around(IVec3::ZERO)]).collect();
+        Self { starts, entries, diagonal }
+    }
+
+    fn apply(&self, u: &[DVec3], out: &mut [DVec3]) {
+        for (ends, out) in self.starts.windows(2).zip(out) {
+            let row = &self.entries[ends[0] as usize..ends[1] as usize];
+            *out = row.iter().fold(DVec3::ZERO, |sum, &(column, w)| sum + w * u[column as usize]);
+        }
+    }
+}
+
+/// Weights of the 27 nodes around each node; 0 for those outside the grid.
+fn stencil(grid: &Grid, samples: &[SurfaceSample]) -> Vec<[f64; 27]> {
+    let mut stencil = vec![[0.0; 27]; grid.nodes()];
+    for s in samples {
+        for (a, wa) in s.weights.iter().enumerate() {
+            let row = grid.index(s.cell + corner(a));
+            for (b, wb) in s.weights.iter().enumerate() {
+                let step = corner(b).as_ivec3() - corner(a).as_ivec3();
+                stencil[row][around(step)] += s.area * wa * wb;
+            }
+        }
+    }
+    let stiffness = STIFFNESS * grid.spacing * grid.spacing;
+    for (index, row) in stencil.iter_mut().enumerate() {
+        let node = grid.node(index);
+        for axis in 0..3 {
+            let mut step = IVec3::ZERO;
+            step[axis] = 1;
+            let below = (node[axis] > 0).then_some(-step);
+            let above = (node[axis] + 1 < grid.size[axis]).then_some(step);
+            for step in below.into_iter().chain(above) {
+                row[around(IVec3::ZERO)] += stiffness;
+                row[around(step)] -= stiffness;
+            }
+        }
+    }
+    stencil
+}
+
 /// 0 / 0 is 0: a component without load stays where it is.
 fn quotient(a: DVec3, b: DVec3) -> DVec3 {
     DVec3::select(b.cmpeq(DVec3::ZERO), DVec3::ZERO, a / b)
@@ -194,7 +207,7 @@ fn corner(n: usize) -> UVec3 {
 }
 
 /// Index in the stencil of a step of -1, 0 or 1 per axis.
-fn around(step: glam::IVec3) -> usize {
+fn around(step: IVec3) -> usize {
     (step.x + 1 + 3 * (step.y + 1) + 9 * (step.z + 1)) as usize
 }
 
