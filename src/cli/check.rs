@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
+use insonify::import;
 use insonify::output;
 use insonify::scene::{Issue, check};
 use insonify::sim::beyond_some_devices;
@@ -50,11 +51,18 @@ impl Check {
     }
 
     fn volume(&self) -> miette::Result<ExitCode> {
-        let (volume, warnings) = Volume::load(&self.file).inspect_err(|_| {
-            output::line(check::tally(1, 0));
-        })?;
+        let failed = |_: &_| output::line(check::tally(1, 0));
+        let segments = import::summary(&self.file).inspect_err(failed)?;
+        if segments.is_some() && volume::is_dicom(&self.file) {
+            output::line(self.file.display());
+            segments.iter().for_each(|segments| output::line(format_args!("  {segments}")));
+            output::line(check::tally(0, 0));
+            return Ok(ExitCode::SUCCESS);
+        }
+        let (volume, warnings) = Volume::load(&self.file).inspect_err(failed)?;
         output::line(self.file.display());
         output::line(&volume);
+        segments.iter().for_each(|segments| output::line(format_args!("  {segments}")));
         if matches!(volume.format, Format::MetaImage | Format::Nrrd)
             && let Some(sequence) = Summary::read(&self.file)?
         {

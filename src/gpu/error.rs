@@ -13,6 +13,11 @@ pub enum GpuError {
         /// The loader's message.
         reason: String,
     },
+    /// The loader cannot read the descriptions of drivers and layers.
+    #[error(
+        "the Vulkan loader cannot read the descriptions of drivers and layers (ERROR_OUT_OF_HOST_MEMORY), most often as one is cut off; `for f in $(echo $VK_DRIVER_FILES:$VK_ICD_FILENAMES | tr : ' ') /usr/share/vulkan/*/*.json /etc/vulkan/*/*.json ~/.local/share/vulkan/*/*.json; do [ ! -f $f ] || python3 -m json.tool $f >/dev/null 2>&1 || echo $f; done` names it: install its package again, or remove the file"
+    )]
+    Descriptions,
     /// No Vulkan device at all, or none that can run the kernels.
     #[error(
         "no usable Vulkan device{seen}; install a GPU driver, or the software driver mesa-vulkan-drivers"

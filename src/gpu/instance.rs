@@ -262,8 +262,13 @@ fn extension_names(
     layer: Option<&CStr>,
 ) -> Result<Vec<std::ffi::CString>, GpuError> {
     // SAFETY: the entry is loaded and the layer name, if any, is NUL-terminated.
-    let properties = unsafe { entry.enumerate_instance_extension_properties(layer) }
-        .map_err(during("listing the instance extensions"))?;
+    let properties = unsafe { entry.enumerate_instance_extension_properties(layer) }.map_err(
+        |code| match code {
+            // What the loader says of a description that it cannot parse, beside sound ones.
+            vk::Result::ERROR_OUT_OF_HOST_MEMORY => GpuError::Descriptions,
+            code => during("listing the instance extensions")(code),
+        },
+    )?;
     Ok(properties
         .iter()
         .filter_map(|p| p.extension_name_as_c_str().ok().map(CStr::to_owned))

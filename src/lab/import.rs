@@ -38,7 +38,7 @@ mod tests;
 pub mod trajectory;
 
 pub use draft::{Draft, Part, way};
-pub use labels::LabelMap;
+pub use labels::{LabelMap, summary};
 pub use pose::View;
 
 /// A fault of an option: its name, the cause, the remedy.

@@ -108,6 +108,12 @@ pub fn is_volume(path: &Path) -> bool {
     EXTENSIONS.iter().any(|e| name.ends_with(e))
 }
 
+/// Returns whether a file is of DICOM by its extension.
+pub fn is_dicom(path: &Path) -> bool {
+    let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
+    extension == "dcm" || extension == "dicom"
+}
+
 impl Volume {
     /// Reads a volume, or several over time, by the extension of its file. Of several values per voxel the
     /// first is read, of several DICOM volumes the first; slices of a tracked sequence are stacked in the

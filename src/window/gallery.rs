@@ -20,7 +20,7 @@ const BETWEEN: f32 = 10.0;
 
 /// First steps, in three lines.
 pub const FIRST_STEPS: [&str; 3] = [
-    "Drag the probe on the skin in the 3D view, or slide it by the arrow keys; Shift leans it, Ctrl and the wheel turn it.",
+    "Drag the probe in the 3D view, over the skin where there is one, or slide it by the arrow keys; Shift leans it, Ctrl and the wheel turn it.",
     "Space freezes the image, L measures a distance in it, F2 saves it with its settings.",
     "The console has gain, depth and all other settings; ? lists the keys.",
 ];

@@ -183,6 +183,9 @@ fn a_dicom_segmentation_becomes_a_scene() {
     );
     let (passed, said) = insonify(folder, &["check", "out/scene.toml"]);
     assert!(passed && said.contains("0 errors, 0 warnings"), "{said}");
+    let (passed, said) = insonify(folder, &["check", "s.dcm"]);
+    assert!(passed && said.contains("in 2 layers, 2 segments: Big one, "), "{said}");
+    assert!(said.contains("0 errors, 0 warnings"), "{said}");
     // Cut anywhere it is an error, and no panic.
     for end in (132..bytes.len()).step_by(97) {
         std::fs::write(folder.join("cut.dcm"), &bytes[..end]).expect("written");

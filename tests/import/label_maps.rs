@@ -164,7 +164,11 @@ fn bad_input_is_refused_within_bounds() {
         }
         bytes
     };
-    let cases: [(&str, &[u8], &str); 7] = [
+    let far = nifti([12; 3], [3.0; 3], [1e9, 0.0, 0.0], |p| {
+        u8::from(p.distance(DVec3::splat(6.0)) < 4.0)
+    });
+    let cases: [(&str, &[u8], &str); 8] = [
+        ("far.nii", &far, "the first voxel is 1.000e9 mm away"),
         ("noise.nii", &noise, "more than 254 different values"),
         ("empty.nii", &empty, "every voxel is 0"),
         ("floats.nii", &floats, "voxels of 0.5"),

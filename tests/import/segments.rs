@@ -138,4 +138,8 @@ fn segments_of_slicer_before_4_11_keep_their_names() {
     let about = [segment(0, "Liver", None), segment(1, "tumour", None)].concat();
     let said = imported(folder.path(), &nrrd(&about, &[organ, inner]));
     assert!(said.contains("Liver: liver,") && said.contains("tumour: tumour,"), "{said}");
+    // Two layers are not called volumes over time and no more.
+    let (passed, said) = insonify(folder.path(), &["check", "s.seg.nrrd"]);
+    let named = "a segmentation in 2 layers, 2 segments: Liver, tumour; `insonify import`";
+    assert!(passed && said.contains(named), "{said}");
 }

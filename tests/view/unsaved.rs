@@ -111,6 +111,12 @@ fn another_scene_opens_by_enter_and_a_dialog_keeps_the_keyboard() {
     desk.press(Key::Letter('-'));
     desk.settle(IMAGE);
     opens(&mut desk, "the dialog", |desk| desk.hold_control(Key::Letter('o')));
+    // Not for a file that is not there: the field keeps the keyboard.
+    desk.retype("gone.toml");
+    desk.still(CENTRE);
+    let typed = desk.grab(CENTRE);
+    desk.press(Key::Enter);
+    desk.wait_for("the error", |d| difference(&d.grab(CENTRE), &typed) > 1.0);
     desk.retype("water.toml");
     desk.still(CENTRE);
     desk.press(Key::Enter);

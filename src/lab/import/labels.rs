@@ -11,7 +11,7 @@ use super::map::Progress;
 use super::masks;
 use super::names::{self, Described, Segment};
 use crate::issue::FileError;
-use crate::volume::{DicomSegment, Segmentation, Summary, Volume, Voxels};
+use crate::volume::{self, DicomSegment, Segmentation, Summary, Volume, Voxels};
 
 /// A label map and what its labels are.
 #[derive(Clone, Debug)]
@@ -42,11 +42,46 @@ pub struct Covered {
     pub share: f64,
 }
 
+/// Most segments that are named in a line.
+const NAMED: usize = 12;
 /// Largest value of a label: above it single precision, in which voxels are held, has not every whole number.
 const MAX_VALUE: f64 = 16_777_215.0;
 /// Largest distance of a label from a whole number: half a step where 25 labels were stretched over eight bits. Of an image
 /// nine values in ten lie farther away.
 const OFF: f64 = 0.05;
+
+/// What a file says of the segments in it, in a line: how many there are and their names; none where it is no segmentation, or
+/// has no words for its labels.
+///
+/// # Errors
+/// A file that cannot be read, or that is damaged.
+pub fn summary(path: &Path) -> Result<Option<String>, FileError> {
+    let (size, layers, segments) = if volume::is_dicom(path) {
+        let Some(found) = Segmentation::load(path)? else { return Ok(None) };
+        let map = of_dicom(found);
+        (Some(map.size), map.layers.len(), map.labels)
+    } else {
+        let segments = names::of(path)?.segments;
+        (None, segments.iter().map(|s| s.layer + 1).max().unwrap_or(1), segments)
+    };
+    if segments.is_empty() {
+        return Ok(None);
+    }
+    let name =
+        |s: &Segment| s.names.first().map_or_else(|| format!("label {}", s.value), Clone::clone);
+    let mut named: Vec<String> = segments.iter().take(NAMED).map(name).collect();
+    if segments.len() > NAMED {
+        named.push(format!("{} more", segments.len() - NAMED));
+    }
+    let voxels = size.map_or_else(String::new, |[x, y, z]| format!(" of {x} x {y} x {z} voxels"));
+    let count = |n: usize, noun: &str| format!("{n} {noun}{}", if n == 1 { "" } else { "s" });
+    Ok(Some(format!(
+        "a segmentation{voxels} in {}, {}: {}; `insonify import` makes a scene of it",
+        count(layers, "layer"),
+        count(segments.len(), "segment"),
+        named.join(", ")
+    )))
+}
 
 impl LabelMap {
     /// Reads a label map: a volume of which every voxel is an integer, 0 for none, or several such layers of segments.
@@ -55,7 +90,7 @@ impl LabelMap {
     /// A file that is no volume; values that are no labels, or too many.
     pub fn load(path: &Path) -> Result<Self, FileError> {
         let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
-        if (extension == "dcm" || extension == "dicom")
+        if volume::is_dicom(path)
             && let Some(found) = Segmentation::load(path)?
         {
             return Ok(of_dicom(found));

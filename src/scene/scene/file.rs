@@ -204,6 +204,14 @@ pub fn volume_of(path: &Path) -> Vec<PathBuf> {
     table.map_or_else(Vec::new, |table| fusion::files(&table.stated))
 }
 
+/// Fails where the scene file at `path` cannot be read as text, with the reason.
+///
+/// # Errors
+/// A file that is missing, is no file, is too large or is no text in UTF-8.
+pub fn readable(path: &Path) -> Result<(), SceneError> {
+    Source::read(path, &[]).map(drop)
+}
+
 /// The override, path and value, that puts the probe of the scene file at `path` to its pose `name`.
 ///
 /// # Errors

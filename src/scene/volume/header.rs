@@ -49,7 +49,7 @@ impl Header {
     /// Reads the voxels of all volumes; of several values per voxel the first.
     pub fn load(mut self, path: &Path) -> Result<(Volume, Vec<Warning>), FileError> {
         let world_from_voxel = self.grid.world_from_voxel().map_err(|cause| {
-            FileError::file(path, cause, "correct the direction or export it again")
+            FileError::file(path, cause, "correct the direction or the origin, or export it again")
         })?;
         let total = self.bytes(path)?;
         let Decoded { mut volumes, rounded, more } = match self.is_streamed() {

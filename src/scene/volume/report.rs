@@ -25,7 +25,10 @@ impl fmt::Display for Volume {
             let pace = match self.interval {
                 // A period over a count has no short value.
                 Some(seconds) => format!("one every {} s", (seconds * 1e12).round() / 1e12),
-                None => "how fast they follow each other is not stated".to_owned(),
+                None => {
+                    "or layers of a segmentation: how fast they follow each other is not stated"
+                        .to_owned()
+                }
             };
             writeln!(f, "  {count} volumes over time, {pace}")?;
         }

@@ -12,7 +12,7 @@ use crate::error::message_of;
 use crate::exit::Exit;
 use crate::model::Model;
 use crate::recent;
-use crate::scene::SceneError;
+use crate::scene::{SceneError, file};
 use crate::settings::Settings;
 use crate::style::{self, button};
 
@@ -296,7 +296,11 @@ fn load(
         false => "All of the file, from its beginning (Enter).",
     };
     if button(ui, !opening, "Open scene", text) || confirmed && !opening {
-        *exit = Some(Exit::Open(path.clone()));
+        // Before it is asked what becomes of unsaved work.
+        match file::readable(&path) {
+            Ok(()) => *exit = Some(Exit::Open(path.clone())),
+            Err(error) => outcome = Some(Err(error)),
+        }
     }
     ui.separator();
     let tables = Settings::tables();
