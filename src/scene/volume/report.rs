@@ -4,7 +4,7 @@ use std::fmt;
 
 use glam::DVec3;
 
-use super::Volume;
+use super::{Format, Volume};
 
 fn vector(v: DVec3) -> String {
     // Turns -0 into 0.
@@ -25,10 +25,12 @@ impl fmt::Display for Volume {
             let pace = match self.interval {
                 // A period over a count has no short value.
                 Some(seconds) => format!("one every {} s", (seconds * 1e12).round() / 1e12),
-                None => {
+                // 3D Slicer has layers of a segmentation in these.
+                None if self.format == Format::Nrrd => {
                     "or layers of a segmentation: how fast they follow each other is not stated"
                         .to_owned()
                 }
+                None => "how fast they follow each other is not stated".to_owned(),
             };
             writeln!(f, "  {count} volumes over time, {pace}")?;
         }
