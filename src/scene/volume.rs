@@ -110,8 +110,8 @@ pub fn is_volume(path: &Path) -> bool {
 
 /// Returns whether a file is of DICOM by its extension.
 pub fn is_dicom(path: &Path) -> bool {
-    let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
-    extension == "dcm" || extension == "dicom"
+    let name = path.to_string_lossy().to_ascii_lowercase();
+    [".dcm", ".dicom"].iter().any(|end| name.ends_with(end))
 }
 
 impl Volume {
@@ -130,7 +130,7 @@ impl Volume {
             nrrd::header(path)?.load(path)
         } else if is(&[".nii", ".nii.gz"]) {
             nifti::header(path)?.load(path)
-        } else if is(&[".dcm", ".dicom"]) {
+        } else if is_dicom(path) {
             dicom::load(path)
         } else {
             Err(FileError::file(

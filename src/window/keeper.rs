@@ -96,7 +96,7 @@ pub(super) struct Keeper {
     all: Option<PathBuf>,
     writer: Option<(Sender<Option<Draft>>, JoinHandle<()>)>,
     /// State of the model at the last writing, and what was unsaved then: saving a trajectory changes no settings.
-    kept: Option<([u64; 3], Vec<String>)>,
+    kept: Option<([u64; 3], Unsaved)>,
     written: Instant,
     /// The first reason for which nothing is kept, from the thread that writes, until it is taken.
     fault: Arc<OnceLock<String>>,
@@ -140,8 +140,8 @@ impl Keeper {
             return None;
         }
         let rows = model.trajectory.recorder.as_ref().map_or(0, |recorder| recorder.rows());
-        let stand = ([model.revision(), model.steps(), rows as u64], unsaved.words());
-        if self.kept.as_ref() == Some(&stand) {
+        let stand = ([model.revision(), model.steps(), rows as u64], unsaved);
+        if self.kept == Some(stand) {
             return None;
         }
         let due = self.written + PAUSE;
@@ -149,10 +149,9 @@ impl Keeper {
             return Some(due);
         }
         (self.kept, self.written) = (Some(stand), now);
-        let what = unsaved.words();
         let scene = model.file.path.canonicalize().unwrap_or_else(|_| model.file.path.clone());
         let left = Leftover::of(model, tools.unfiled(model), now);
-        let session = Session { scene, at: self::now(), what, left };
+        let session = Session { scene, at: self::now(), what: unsaved.words(), left };
         self.send(Some(Draft { entries: model.changes(true), session }));
         None
     }

@@ -5,6 +5,7 @@ use super::model::Model;
 use super::tools::Tools;
 
 /// The unsaved work that a way would lose.
+#[derive(Clone, Copy, PartialEq)]
 pub(super) struct Unsaved {
     /// Settings and named poses.
     pub(super) settings: bool,

@@ -11,6 +11,7 @@ use super::map::Progress;
 use super::masks;
 use super::names::{self, Described, Segment};
 use crate::issue::FileError;
+use crate::scene::check::counted;
 use crate::volume::{self, DicomSegment, Segmentation, Summary, Volume, Voxels};
 
 /// A label map and what its labels are.
@@ -50,7 +51,7 @@ const MAX_VALUE: f64 = 16_777_215.0;
 /// nine values in ten lie farther away.
 const OFF: f64 = 0.05;
 
-/// What a file says of the segments in it, in a line: how many there are and their names; none where it is no segmentation, or
+/// The segments of a file in one line: how many there are and their names; none where it is no segmentation, or
 /// has no words for its labels.
 ///
 /// # Errors
@@ -74,11 +75,10 @@ pub fn summary(path: &Path) -> Result<Option<String>, FileError> {
         named.push(format!("{} more", segments.len() - NAMED));
     }
     let voxels = size.map_or_else(String::new, |[x, y, z]| format!(" of {x} x {y} x {z} voxels"));
-    let count = |n: usize, noun: &str| format!("{n} {noun}{}", if n == 1 { "" } else { "s" });
     Ok(Some(format!(
         "a segmentation{voxels} in {}, {}: {}; `insonify import` makes a scene of it",
-        count(layers, "layer"),
-        count(segments.len(), "segment"),
+        counted(layers, "layer"),
+        counted(segments.len(), "segment"),
         named.join(", ")
     )))
 }

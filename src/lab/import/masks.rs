@@ -8,13 +8,12 @@ use super::grid::Grid;
 use super::labels::{LabelMap, number};
 use super::names::Segment;
 use crate::issue::FileError;
-use crate::volume::{Volume, is_volume};
+use crate::volume::{Volume, is_dicom, is_volume};
 
 /// Returns whether a file is read as a mask: a volume, but no slice of DICOM, and not hidden.
 pub(super) fn is_mask(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-    let slice = [".dcm", ".dicom"].iter().any(|ends| name.ends_with(ends));
-    is_volume(path) && !slice && !name.starts_with('.')
+    is_volume(path) && !is_dicom(path) && !name.starts_with('.')
 }
 
 /// The masks of `folder` as labels, in the order of their names. Voxels are read when the labels are merged.

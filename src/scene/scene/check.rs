@@ -11,4 +11,4 @@ mod starts;
 
 pub use mesh::{Facts, SENSIBLE_SIZE};
 pub(super) use mesh::{examine, examine_shape};
-pub use report::{Report, report, tally};
+pub use report::{Report, counted, report, tally};

@@ -51,7 +51,7 @@ pub(super) struct Solver<'a> {
 
 /// A sparse matrix over the nodes, row by row.
 struct Matrix {
-    /// Where each row's entries begin, and where the last row's end.
+    /// The place of each row's first entry, then the number of all.
     starts: Vec<u32>,
     /// Columns and values.
     entries: Vec<(u32, f64)>,

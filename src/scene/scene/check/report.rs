@@ -58,8 +58,12 @@ impl fmt::Display for Report {
 
 /// The last row of a report: `1 error, 2 warnings`.
 pub fn tally(errors: usize, warnings: usize) -> String {
-    let count = |n: usize, noun: &str| format!("{n} {noun}{}", if n == 1 { "" } else { "s" });
-    format!("{}, {}", count(errors, "error"), count(warnings, "warning"))
+    format!("{}, {}", counted(errors, "error"), counted(warnings, "warning"))
+}
+
+/// A number of things in words: `1 error`, `2 errors`.
+pub fn counted(n: usize, noun: &str) -> String {
+    format!("{n} {noun}{}", if n == 1 { "" } else { "s" })
 }
 
 /// Checks a scene (.toml) or a mesh file.
