@@ -1,5 +1,6 @@
 //! Packets of pulses for Doppler modes: the colour box, and the velocity at which its colours fold over.
 
+pub mod broadening;
 pub mod gate;
 pub mod sound;
 pub mod spectrum;

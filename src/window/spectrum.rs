@@ -88,7 +88,8 @@ pub(super) fn saved(model: &Model, panel: &mut SpectrumPanel) -> Option<SavedStr
     let (probe, made) = strip.of()?;
     let spectral = shown(made, &model.settings.spectral);
     let end = end(strip, panel.window);
-    panel.traced.follow(strip, &spectral, [end, panel.window], None);
+    let scales = model.settings.imaging.psf_scale;
+    panel.traced.follow(strip, &spectral, scales, [end, panel.window], None);
     let spectrogram = strip.even(end, panel.window, WIDEST).shown(probe, &spectral);
     let velocities = &spectrogram.velocities;
     let measurements = panel.spans.lettered().map(|(letter, span)| {
@@ -235,7 +236,8 @@ impl SpectrumPanel {
         self.drawn.show(ui, inner);
         spans::seconds(ui, inner, self.window, end);
         if self.traces {
-            self.traced.follow(strip, &spectral, [end, self.window], Some(now));
+            let scales = model.settings.imaging.psf_scale;
+            self.traced.follow(strip, &spectral, scales, [end, self.window], Some(now));
             self.traced.draw(ui, &self.drawn, inner, [end, self.window]);
         }
         let at = |[seconds, velocity]: [f64; 2]| {

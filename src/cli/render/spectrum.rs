@@ -8,6 +8,7 @@ use serde_json::{Map, Value, json};
 
 use super::Render;
 use crate::cli::common::{self, Progress};
+use insonify::doppler::broadening::Broadening;
 use insonify::doppler::spectrum::{Analyser, Spectrogram, greys, image_gain};
 use insonify::doppler::trace::{Measured, Trace, measure, trace};
 use insonify::doppler::{gate, nyquist, sound};
@@ -109,7 +110,8 @@ pub fn write(
     }
     progress.finish();
     let made = analyser.take().shown(&scene.probe, &spectral);
-    let traces = trace(&made);
+    let lines = Broadening::of(&scene.probe, scene.imaging.psf_scale, &spectral);
+    let traces = trace(&made, &lines);
     let measured = measure(&made.times, &traces);
     sidecar.insert("spectrum".into(), facts(scene, &made, &traces, measured));
     write_picture(output, scene, &made)

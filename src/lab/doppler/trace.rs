@@ -1,5 +1,6 @@
 //! Traces of a spectrogram, and what is measured on them.
 
+use super::broadening::Broadening;
 use super::spectrum::Spectrogram;
 
 /// Time over which spectra are averaged for a trace, to either side, s.
@@ -19,7 +20,7 @@ const PULSATILE: f64 = 0.25;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trace {
     /// The maximum, of the direction in which most is heard: where what stands out of the noise falls to half of its mean, each
-    /// bin's power weighted by itself. 0 where nothing is heard.
+    /// bin's power weighted by itself, less what broadening puts beyond the fastest velocity. 0 where nothing is heard.
     pub maximum: Vec<f64>,
     /// The mean over the power that stands out of the noise.
     pub mean: Vec<f64>,
@@ -45,13 +46,15 @@ fn noise(made: &Spectrogram) -> f64 {
     sums[(QUIET * bins as f64) as usize] / made.times.len().max(1) as f64
 }
 
-/// The traces of spectra.
-pub fn trace(made: &Spectrogram) -> Trace {
+/// The traces of spectra, whose lines are as wide as `lines` says.
+pub fn trace(made: &Spectrogram, lines: &Broadening) -> Trace {
     let bins = made.velocities.len();
     let apart = made.times.windows(2).map(|t| t[1] - t[0]).next().unwrap_or(1.0);
     let beside = (BESIDE / apart) as usize;
     let columns: Vec<&[f32]> = made.columns().collect();
     let mut out = Trace::default();
+    let mut inner = Vec::with_capacity(columns.len());
+    let reach = (SPREAD * bins as f64) as usize;
     let noise = noise(made);
     for x in 0..columns.len() {
         let near = &columns[x.saturating_sub(beside)..(x + beside + 1).min(columns.len())];
@@ -59,11 +62,12 @@ pub fn trace(made: &Spectrogram) -> Trace {
             near.iter().map(|column| f64::from(column[j])).sum::<f64>() / near.len() as f64
         };
         let power: Vec<f64> = (0..bins).map(mean).collect();
-        let power = smoothed(&power, (SPREAD * bins as f64) as usize);
+        let power = smoothed(&power, reach);
         let peak = power.iter().copied().fold(0.0, f64::max);
         if peak <= HEARD * noise {
             out.maximum.push(0.0);
             out.mean.push(0.0);
+            inner.push(0.0);
             continue;
         }
         // Towards and away.
@@ -77,13 +81,33 @@ pub fn trace(made: &Spectrogram) -> Trace {
         let all = sides[0] + sides[1];
         let threshold = (noise + squares / all / 2.0).max(HEARD * noise);
         out.mean.push(weighted / all);
-        out.maximum.push(edge(&power, &made.velocities, threshold, sides));
+        let [slowest, fastest] = edges(&power, &made.velocities, threshold, sides);
+        out.maximum.push(fastest);
+        inner.push(slowest);
     }
+    // Neighbours that were averaged are as good as a longer line.
+    let spread = (2 * reach + 1) as f64 * made.step() / 12.0_f64.sqrt();
+    let lines = Broadening { window: lines.window.hypot(spread), ..*lines };
+    corrected(&mut out.maximum, &inner, &lines);
     out
 }
 
-/// The velocity farthest from zero, on the side that is louder, at which the power falls to `threshold`.
-fn edge(power: &[f64], velocities: &[f64], threshold: f64, sides: [f64; 2]) -> f64 {
+/// Takes off what lines of these widths put beyond the fastest velocities. How wide the range of velocities in the gate is, over
+/// the fastest, changes little while their speed does: it is that of the median of those times at which it is fast.
+fn corrected(maximum: &mut [f64], inner: &[f64], lines: &Broadening) {
+    let fastest = maximum.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
+    let fast = maximum.iter().zip(inner).filter(|(v, _)| v.abs() >= fastest / 2.0 && **v != 0.0);
+    let mut widths: Vec<f64> = fast.map(|(&v, &inner)| lines.half_width([inner, v])).collect();
+    if widths.is_empty() {
+        return;
+    }
+    let middle = widths.len() / 2;
+    let (_, width, _) = widths.select_nth_unstable_by(middle, f64::total_cmp);
+    maximum.iter_mut().for_each(|v| *v = lines.fastest(*v, *width));
+}
+
+/// The velocities nearest to and farthest from zero, on the side that is louder, at which the power falls to `threshold`.
+fn edges(power: &[f64], velocities: &[f64], threshold: f64, sides: [f64; 2]) -> [f64; 2] {
     let last = power.len() - 1;
     let between = |inner: usize, outer: usize| {
         let fall = power[inner] - power[outer];
@@ -92,11 +116,14 @@ fn edge(power: &[f64], velocities: &[f64], threshold: f64, sides: [f64; 2]) -> f
     };
     let beyond = |v: &f64| if sides[0] >= sides[1] { *v > 0.0 } else { *v < 0.0 };
     let mut loud = (0..=last).filter(|&j| power[j] >= threshold && beyond(&velocities[j]));
-    let found = match sides[0] >= sides[1] {
-        true => loud.next_back().map(|j| between(j, (j + 1).min(last))),
-        false => loud.next().map(|j| between(j, j.saturating_sub(1))),
-    };
-    found.unwrap_or(0.0)
+    let Some(lowest) = loud.next() else { return [0.0; 2] };
+    let highest = loud.next_back().unwrap_or(lowest);
+    let ends =
+        [between(lowest, lowest.saturating_sub(1)), between(highest, (highest + 1).min(last))];
+    match sides[0] >= sides[1] {
+        true => ends,
+        false => [ends[1], ends[0]],
+    }
 }
 
 /// What is measured on the trace of a pulsatile flow, means over its whole beats. Velocities are magnitudes, mm/s.

@@ -9,6 +9,7 @@ use crate::model::spectrum::SpectrumStrip;
 use crate::settings::Spectral;
 use crate::spans::Spans;
 use crate::style;
+use insonify_lab::doppler::broadening::Broadening;
 use insonify_lab::doppler::trace::{Measured, Trace, measure, trace};
 
 /// Most spectra per second that traces are made of.
@@ -30,11 +31,12 @@ pub(super) struct Traced {
 
 impl Traced {
     /// Makes the traces anew where strip or settings have changed; not before some time has passed since the last ones,
-    /// where the moment is given.
+    /// where the moment is given. `scales` are those of `imaging.psf_scale`.
     pub(super) fn follow(
         &mut self,
         strip: &SpectrumStrip,
         spectral: &Spectral,
+        scales: [f64; 3],
         [end, window]: [f64; 2],
         now: Option<Instant>,
     ) {
@@ -54,7 +56,7 @@ impl Traced {
             return;
         };
         let made = strip.even(end, covered, count).shown(probe, spectral);
-        self.trace = trace(&made);
+        self.trace = trace(&made, &Broadening::of(probe, scales, spectral));
         self.measured = measure(&made.times, &self.trace);
         self.times = made.times;
     }
