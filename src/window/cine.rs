@@ -56,7 +56,7 @@ fn player(ui: &mut Ui, cine: &mut Cine<Frame>, format: &mut Format, now: Instant
     let is_wide = ui.available_width() > WIDE;
     ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
         if is_wide {
-            choose(ui, format);
+            choose(ui, cine, format);
             speed(ui, cine, now);
             let here = cine.cursor();
             if button(ui, "]", "The loop that plays and is saved ends with this image") {
@@ -86,15 +86,33 @@ fn speed(ui: &mut Ui, cine: &mut Cine<Frame>, now: Instant) {
     }
 }
 
-fn choose(ui: &mut Ui, format: &mut Format) {
+/// Bytes of the marked part of the loop as DICOM, which is not compressed.
+fn uncompressed(cine: &Cine<Frame>) -> u64 {
+    let (mut count, mut most, mut values) = (0, 0, 1);
+    for (frame, _) in cine.marked() {
+        let [width, height, _] = frame.image.extent();
+        count += 1;
+        most = most.max(u64::from(width) * u64::from(height));
+        if frame.coloured.is_some() {
+            values = 3;
+        }
+    }
+    count * most * values
+}
+
+fn choose(ui: &mut Ui, cine: &Cine<Frame>, format: &mut Format) {
     let name = |format| match format {
         Format::Gif => "GIF".to_owned(),
         Format::Mp4 => "MP4".to_owned(),
         Format::Sequence => "PNGs".to_owned(),
         Format::Dicom => "DICOM".to_owned(),
     };
-    let tip = "How a clip is saved (F3): an animated GIF, an MP4 film (the program ffmpeg makes it), a folder of PNG \
-               files, or DICOM; with DICOM chosen, a still (F2) is saved as DICOM beside its PNG, too";
+    let mega = uncompressed(cine).div_ceil(1_000_000);
+    let tip = format!(
+        "How a clip is saved (F3): an animated GIF, an MP4 film (the program ffmpeg makes it), a folder of PNG \
+               files, or DICOM (uncompressed: {mega} MB of what is marked); with DICOM chosen, a still (F2) is saved as DICOM \
+               beside its PNG, too"
+    );
     let all = [Format::Gif, Format::Mp4, Format::Sequence, Format::Dicom];
     style::choice(ui, "format", 56.0, format, &all, name).on_hover_text(tip);
 }

@@ -21,8 +21,8 @@ pub(super) struct Files {
     pub(super) with_pose: bool,
     /// The scene file to be opened.
     pub(super) wanted: Option<PathBuf>,
-    /// A scene is being opened.
-    pub(super) opening: bool,
+    /// Name of the scene that is being opened.
+    pub(super) opening: Option<String>,
     dialog: Option<Dialog>,
 }
 

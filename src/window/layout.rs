@@ -306,8 +306,10 @@ fn images(
     if let Some(fault) = spectrum::fault(model) {
         notice::badge(ui, "no spectra", "Spectra cannot be made:", &fault);
     }
-    if state.prepares {
-        notice::preparing(ui, state.preparing);
+    match &state.common.files.opening {
+        Some(scene) => notice::preparing(ui, &format!("Opening {scene}")),
+        None if state.prepares => notice::preparing(ui, state.preparing),
+        None => {}
     }
     notice::show(ui, &mut state.common.inputs);
     notice::recording(ui, model, now);

@@ -278,8 +278,8 @@ impl Open {
     pub(super) fn stop(&mut self) {
         self.state.stopped = true;
         self.awaited = false;
-        if self.coming.take().is_some() {
-            self.state.common.files.opening = self.opening.is_some();
+        if self.coming.take().is_some() && self.opening.is_none() {
+            self.state.common.files.opening = None;
         }
         self.window.request_redraw();
     }

@@ -290,7 +290,7 @@ fn load(
         ui.label(RichText::new(text).color(style::FAINT));
         clicked
     };
-    let opening = files.opening;
+    let opening = files.opening.is_some();
     let text = match opening {
         true => "Opening. The image goes on until the scene is there.",
         false => "All of the file, from its beginning (Enter).",

@@ -86,6 +86,13 @@ impl View3d {
         if shown.iter().all(|s| s.show == Show::Hidden) {
             shown.iter_mut().for_each(Shown::toggle);
         }
+        // The body's surface, on which the probe is dragged, is to be seen whatever it is made of.
+        let skin = scene.contact.iter().flat_map(|contact| &contact.skin);
+        let skin: Vec<usize> = skin.map(|i| scene.instances[*i].tissue).collect();
+        let mut surface = shown.iter_mut().filter(|s| skin.contains(&s.tissue));
+        if surface.all(|s| s.show == Show::Hidden) {
+            shown.iter_mut().filter(|s| skin.contains(&s.tissue)).for_each(Shown::toggle);
+        }
         Self {
             camera: overview(&scene.world_from_probe, &scene.probe),
             cut: false,
@@ -195,7 +202,7 @@ fn encloses_much(scene: &Scene, tissue: usize) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Instance, Tissue, shapes};
+    use crate::scene::{Contact, Instance, Tissue, shapes};
 
     fn scene() -> Scene {
         let tissue =
@@ -220,6 +227,20 @@ mod tests {
             template(1, 4, 9.0),
         ];
         scene
+    }
+
+    #[test]
+    fn the_surface_that_the_probe_is_dragged_on_is_seen_whatever_it_is_made_of() {
+        let shows = |skin: Vec<usize>| {
+            let mut scene = scene();
+            scene.contact = Some(Contact { skin, gel: 1.0, couplant: 0 });
+            View3d::new(&scene).shown.iter().map(|s| s.show).collect::<Vec<Show>>()
+        };
+        let usual = [Show::SeeThrough, Show::Hidden, Show::Solid, Show::Solid];
+        // Muscle is left out elsewhere.
+        assert_eq!(shows(vec![1])[1], Show::SeeThrough);
+        assert_eq!(shows(vec![0, 1]), usual, "one of the two is seen");
+        assert_eq!(shows(Vec::new()), usual);
     }
 
     #[test]

@@ -141,7 +141,9 @@ impl Open {
             ..
         } = self;
         // A scene handed over is lost with the device; the user can open it again.
-        state.common.files.opening = opening.is_some();
+        if opening.is_none() {
+            state.common.files.opening = None;
+        }
         // Everything on the lost device is dropped before there is another.
         drop((frame, pictured));
         state.common.tools.lose();

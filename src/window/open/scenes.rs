@@ -50,7 +50,8 @@ impl Open {
             // Overrides belong to this file, not to another one.
             let overrides = if path == model.file.path { own() } else { Vec::new() };
             self.watch.set(&path);
-            self.state.common.files.opening = true;
+            self.state.common.files.opening = Some(name(&path));
+            self.window.request_redraw();
             self.opening = begin(path, overrides, Purpose::Open);
         } else if self.opening.is_some() || self.coming.is_some() || self.state.stopped {
             // What has changed is read afterwards.
@@ -139,7 +140,7 @@ impl Open {
         self.state.dual.end();
         self.state.panels.all().into_iter().for_each(Panel::leave);
         self.state.common.open.set(&planes::ROW, false);
-        self.state.common.files.opening = false;
+        self.state.common.files.opening = None;
         self.state.common.files.close();
         self.state.offer = self.state.keeper.orphan(&self.model.file.path);
     }
@@ -167,7 +168,7 @@ impl Open {
             return;
         }
         self.watch.set(&self.model.file.path);
-        self.state.common.files.opening = false;
+        self.state.common.files.opening = None;
         if let Err(problem) = self.state.common.files.refuse(problem) {
             self.state.problem = Some(problem);
         }
