@@ -20,6 +20,7 @@ mod hold;
 pub mod layouts;
 mod links;
 mod members;
+mod packed;
 mod plan;
 mod pose;
 mod reading;
@@ -32,7 +33,7 @@ mod studio;
 mod tables;
 
 pub use members::colours;
-pub use plan::{Array, Format, Part, Plan, Sample, Segmented, Split};
+pub use plan::{Array, Format, Part, Plan, Precision, Sample, Segmented, Split};
 pub use run::{MOST_CHECKED, Run};
 pub use sheet::Gallery;
 pub use store::{Event, Store};

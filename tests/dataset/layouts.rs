@@ -186,3 +186,27 @@ fn a_check_tells_time_files_and_bytes() {
     assert!((told / (written as f64 / 1e6) - 1.0).abs() < 0.1, "{line}: {written}");
     assert!(!desk.path("unmade").exists());
 }
+
+#[test]
+fn samples_in_folders_of_a_thousand_are_found() {
+    let set = Desk::new();
+    for (name, bytes) in
+        files(&desk().path("whole")).into_iter().filter(|(n, _)| !n.starts_with("webdataset"))
+    {
+        // The first six as if they were those of another thousand.
+        let deep = match name.strip_prefix("folder/train/") {
+            Some(own) if own < "000006" => format!("folder/train/000/{own}"),
+            _ => name,
+        };
+        let path = set.path("moved").join(deep);
+        std::fs::create_dir_all(path.parent().expect("a folder")).expect("room");
+        std::fs::write(path, bytes).expect("room");
+    }
+    let (went_well, said) = lay(&set, "moved", "huggingface", "hf", &[]);
+    assert!(went_well, "{said}");
+    let table = std::fs::read_to_string(set.path("hf/train/metadata.jsonl")).expect("there");
+    let names: Vec<_> =
+        table.lines().map(|line| json(line.as_bytes())["file_name"].to_string()).collect();
+    assert_eq!(names.len(), 12);
+    assert!(names.is_sorted(), "{names:?}");
+}

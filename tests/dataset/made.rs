@@ -1,8 +1,10 @@
 //! What is made: the same bytes whole and in shards, the image that `render` makes, labels that fit it.
 
+use std::path::Path;
+
 use serde_json::Value;
 
-use crate::dataset::{Desk, PARTS, SAMPLES, desk, files, program};
+use crate::dataset::{Desk, PARTS, PLAN, SAMPLES, desk, files, program};
 
 #[test]
 fn a_shard_alone_is_the_same_bytes_as_in_the_whole() {
@@ -159,4 +161,80 @@ fn a_contact_sheet_shows_each_sample_with_its_labels() {
         .count();
     // Twenty images of 48 x 80 pixels are colored.
     assert!(colored > 20 * 48 * 80 / 2, "{colored}");
+}
+
+/// The type and the data of a NumPy file of format 1.0.
+fn array(path: &Path) -> (String, Vec<u8>) {
+    let bytes = std::fs::read(path).expect("an array");
+    let head = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
+    let header = String::from_utf8_lossy(&bytes[10..head]).into_owned();
+    (header.split('\'').nth(3).expect("a type").to_owned(), bytes[head..].to_vec())
+}
+
+#[test]
+fn half_precision_keeps_the_numbers_in_half_the_bytes() {
+    let desk = desk();
+    let arrays = r#"arrays = ["envelope", "iq", "position", "true_tissue"]"#;
+    let plan = PLAN.replace(r#"arrays = ["envelope", "iq"]"#, arrays);
+    desk.write("single.toml", &plan);
+    desk.write("half.toml", &format!("precision = \"half\"\n{plan}"));
+    for name in ["single", "half"] {
+        let args = ["dataset", &format!("{name}.toml"), "-o", name, "--shard", "0/10"];
+        let (went_well, said) = program::insonify(&desk.path(""), &args);
+        assert!(went_well, "{said}");
+    }
+    let path = |set: &str, end: &str| desk.path(&format!("{set}/folder/train/000001.{end}"));
+    let facts: Value =
+        serde_json::from_slice(&std::fs::read(path("half", "json")).unwrap()).unwrap();
+    assert_eq!(facts["scales"].as_object().unwrap().len(), 3, "of the quantities");
+    for name in ["envelope", "iq", "position"] {
+        let end = format!("{name}.npy");
+        let ((single, whole), (half, packed)) =
+            (array(&path("single", &end)), array(&path("half", &end)));
+        assert_eq!((single.as_str(), half.as_str()), ("<f4", "<f2"), "{name}");
+        assert_eq!(whole.len(), 2 * packed.len(), "{name}");
+        let scale = facts["scales"][name].as_f64().unwrap();
+        let wanted =
+            whole.chunks_exact(4).map(|b| f64::from(f32::from_le_bytes(b.try_into().unwrap())));
+        let read =
+            packed.chunks_exact(2).map(|b| f64::from(half::f16::from_le_bytes([b[0], b[1]])));
+        let mut numbers = 0;
+        for (wanted, read) in wanted.zip(read).filter(|(wanted, _)| !wanted.is_nan()) {
+            // Eleven bits; below 2^-14 of what is stored, its steps of 2^-24.
+            let step = (wanted.abs() / 2048.0).max(scale * 2_f64.powi(-24));
+            assert!(
+                (read * scale - wanted).abs() <= step,
+                "{name}: {wanted} became {}",
+                read * scale
+            );
+            numbers += usize::from(wanted != 0.0);
+        }
+        assert!(numbers > 1000, "{name}: {numbers}");
+    }
+    let (kind, tissues) = array(&path("half", "true_tissue.npy"));
+    assert_eq!(kind, "<i2");
+    let wanted = array(&path("single", "true_tissue.npy")).1;
+    let wide = tissues
+        .chunks_exact(2)
+        .flat_map(|b| i32::from(i16::from_le_bytes([b[0], b[1]])).to_le_bytes());
+    assert!(wide.eq(wanted));
+}
+
+#[test]
+fn of_more_than_a_thousand_samples_a_thousand_share_a_folder() {
+    let desk = Desk::new();
+    desk.write("plan.toml", &PLAN.replace("samples = 12", "samples = 1200"));
+    let last = ["-o", "large", "--shard", "599/604"];
+    desk.made(&last);
+    let folder = |number: &str| desk.path(&format!("large/folder/train/{number}"));
+    for name in ["001198.png", "001199.seg.png", "001199.json", "001199.iq.npy"] {
+        assert!(folder(&format!("001/{name}")).exists(), "{name}");
+    }
+    assert!(!folder("001199.png").exists());
+    let before = files(&desk.path("large"));
+    let draft = folder("001/.001199.png.1");
+    std::fs::write(&draft, "half").unwrap();
+    std::fs::remove_file(folder("001/001199.png")).unwrap();
+    desk.made(&[&last[..], &["--resume"]].concat());
+    assert!(!draft.exists() && files(&desk.path("large")) == before);
 }

@@ -1,11 +1,11 @@
-//! NumPy files of little-endian 32-bit words, format 1.0 and 2.0.
+//! NumPy files of little-endian words of 32 or 16 bits, format 1.0 and 2.0.
 
 use std::io::Write;
 use std::path::Path;
 
 use super::files::Draft;
 
-/// Type of the 32-bit words of an array.
+/// Type of the words of an array.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Element {
     /// `f32`.
@@ -14,6 +14,10 @@ pub enum Element {
     Word,
     /// `i32`.
     Integer,
+    /// Floating point of 16 bits, IEEE 754's binary16.
+    Half,
+    /// `i16`.
+    Short,
 }
 
 impl Element {
@@ -22,6 +26,16 @@ impl Element {
             Self::Float => "<f4",
             Self::Word => "<u4",
             Self::Integer => "<i4",
+            Self::Half => "<f2",
+            Self::Short => "<i2",
+        }
+    }
+
+    /// Bytes of a word.
+    fn size(self) -> usize {
+        match self {
+            Self::Float | Self::Word | Self::Integer => 4,
+            Self::Half | Self::Short => 2,
         }
     }
 }
@@ -52,7 +66,8 @@ pub fn write_to(
     shape: &[usize],
     bytes: &[u8],
 ) -> std::io::Result<()> {
-    assert_eq!(4 * shape.iter().product::<usize>(), bytes.len(), "{shape:?} and its data");
+    let wanted = element.size() * shape.iter().product::<usize>();
+    assert_eq!(wanted, bytes.len(), "{shape:?} and its data");
     let descr = element.descr();
     let shape: Vec<_> = shape.iter().map(|n| format!("{n},")).collect();
     let shape = shape.join(" ");

@@ -13,6 +13,7 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 
 use super::DatasetError;
+use super::store::thousand;
 use crate::issue::FileError;
 use crate::output::lock::{Hold, LOCK};
 use crate::output::{self, files};
@@ -48,9 +49,6 @@ impl Layout {
         }
     }
 }
-
-/// Images of a folder, in layouts that have folders of them.
-const PER_FOLDER: u64 = 1000;
 
 /// The files of a layout that is being written.
 struct Out {
@@ -93,8 +91,7 @@ impl Out {
 
 /// The path of an image among a thousand others: `train/000/000123.png`.
 fn placed(sample: &Labelled, end: &str) -> String {
-    let folder = sample.number / PER_FOLDER;
-    format!("{}/{folder:03}/{}.{end}", sample.split, sample.name)
+    format!("{}/{}/{}.{end}", sample.split, thousand(sample.number), sample.name)
 }
 
 /// Writes the data set in the folder `root` in a layout: into the folder `to`, or as the table `to`. `progress` hears of each

@@ -1,11 +1,14 @@
 //! The files of a sample: image, segmentation, arrays, and what was drawn.
 
+use std::borrow::Cow;
+
 use glam::DAffine3;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder as _};
 use serde_json::{Map, Value, json};
 
-use super::plan::{Array, Plan};
+use super::packed;
+use super::plan::{Array, Plan, Precision};
 use super::studio::Made;
 use crate::exchange::wxyz;
 use crate::output;
@@ -30,42 +33,76 @@ pub(super) fn extensions(plan: &Plan) -> Vec<String> {
 /// The bytes of a sample's files, in the order of [`extensions`].
 pub(super) fn members(plan: &Plan, made: &Made) -> Vec<Vec<u8>> {
     let mut out = vec![grey(made), indexed(plan, made)];
-    out.extend(plan.arrays.iter().map(|array| npy(*array, made)));
+    out.extend(plan.arrays.iter().map(|array| npy(*array, made, plan.precision)));
     let facts = output::json(&facts(plan, made));
     out.push(facts.into_bytes());
     out
 }
 
-/// An array as a NumPy file.
-fn npy(array: Array, made: &Made) -> Vec<u8> {
+/// The values of an array, and its shape.
+fn values(array: Array, made: &Made) -> (Vec<usize>, Values<'_>) {
     let probe = &made.settings.probe;
     let [lines, samples] = [probe.scanlines as usize, probe.samples as usize];
     let asked = "the plan asks for it";
-    let (element, shape, bytes): (_, Vec<usize>, &[u8]) = match array {
+    match array {
         Array::Envelope => {
             let values = made.envelope.as_deref().expect(asked);
-            (Element::Float, vec![lines, samples], bytemuck::cast_slice(values))
+            (vec![lines, samples], Values::Quantities(values))
         }
         Array::Iq => {
             let values = made.iq.as_deref().expect(asked);
-            (Element::Float, vec![lines, samples, 2], bytemuck::cast_slice(values))
+            (vec![lines, samples, 2], Values::Quantities(values))
         }
         Array::Rf => {
             let values = made.rf.as_deref().expect(asked);
-            (Element::Float, vec![lines, values.len() / lines], bytemuck::cast_slice(values))
+            (vec![lines, values.len() / lines], Values::Quantities(values))
         }
         Array::Label(kind) => {
             let label = made.labels.iter().find(|label| label.kind == kind).expect(asked);
-            let (element, bytes) = match &label.values {
-                LabelValues::Indices(values) => (Element::Integer, bytemuck::cast_slice(values)),
-                LabelValues::Quantities(values) => (Element::Float, bytemuck::cast_slice(values)),
+            let values = match &label.values {
+                LabelValues::Indices(values) => Values::Indices(values),
+                LabelValues::Quantities(values) => Values::Quantities(values),
             };
-            (element, label.shape.clone(), bytes)
+            (label.shape.clone(), values)
+        }
+    }
+}
+
+/// Values of an array.
+enum Values<'m> {
+    Indices(&'m [i32]),
+    Quantities(&'m [f32]),
+}
+
+/// An array as a NumPy file.
+fn npy(array: Array, made: &Made, precision: Precision) -> Vec<u8> {
+    let (shape, values) = values(array, made);
+    let (element, bytes): (_, Cow<'_, [u8]>) = match (values, precision) {
+        (Values::Quantities(all), Precision::Half) => (Element::Half, packed::halves(all).into()),
+        (Values::Quantities(all), _) => (Element::Float, bytemuck::cast_slice(all).into()),
+        (Values::Indices(all), precision) => {
+            let short = (precision == Precision::Half).then(|| packed::shorts(all)).flatten();
+            match short {
+                Some(short) => (Element::Short, short.into()),
+                None => (Element::Integer, bytemuck::cast_slice(all).into()),
+            }
         }
     };
     let mut out = Vec::new();
-    npy::write_to(&mut out, element, &shape, bytes).expect("written to memory");
+    npy::write_to(&mut out, element, &shape, &bytes).expect("written to memory");
     out
+}
+
+/// What the numbers of each array in half precision are to be multiplied by.
+fn scales(plan: &Plan, made: &Made) -> Map<String, Value> {
+    let half = plan.arrays.iter().filter(|_| plan.precision == Precision::Half);
+    let scaled = half.filter_map(|array| match values(*array, made) {
+        (_, Values::Quantities(all)) => {
+            Some((array.name().to_owned(), json!(f64::from(packed::scale(all)))))
+        }
+        (_, Values::Indices(_)) => None,
+    });
+    scaled.collect()
 }
 
 /// The image as a PNG file of 8-bit grey.
@@ -114,7 +151,7 @@ pub(super) fn facts(plan: &Plan, made: &Made) -> Value {
     }
     let (width, height) = made.image.dimensions();
     let place = made.world_from_probe;
-    json!({
+    let mut facts = json!({
         "sample": sample.number,
         "split": plan.splits[of.split].name,
         "scene": of.name,
@@ -138,7 +175,12 @@ pub(super) fn facts(plan: &Plan, made: &Made) -> Value {
             "sample_mm": made.settings.probe.sample_pitch(), "frequency_mhz": made.settings.probe.frequency,
         },
         "classes": pixels,
-    })
+    });
+    let scales = scales(plan, made);
+    if !scales.is_empty() {
+        facts["scales"] = scales.into();
+    }
+    facts
 }
 
 /// The value of an entry of a scene file.

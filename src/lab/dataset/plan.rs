@@ -98,6 +98,17 @@ pub enum Segmented {
     True,
 }
 
+/// Words of the numbers in the `.npy` files of samples.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Precision {
+    /// 32 bits.
+    #[default]
+    Single,
+    /// 16 bits, and a power of two for each array by which they are multiplied.
+    Half,
+}
+
 /// A plan that has been checked.
 pub struct Plan {
     /// Headline of the contact sheet; empty: none.
@@ -110,6 +121,8 @@ pub struct Plan {
     pub formats: Vec<Format>,
     /// Arrays beside the images.
     pub arrays: Vec<Array>,
+    /// Words of their numbers in `.npy` files.
+    pub precision: Precision,
     /// The tissue that segmentations show.
     pub segmentation: Segmented,
     /// The splits, in their order.
@@ -202,6 +215,7 @@ impl Plan {
             quality,
             formats: Format::ALL.into_iter().filter(|f| table.formats.contains(f)).collect(),
             arrays: arrays(&document, &table.arrays)?,
+            precision: table.precision,
             segmentation: table.segmentation,
             splits: Vec::new(),
             classes: Vec::new(),

@@ -1,6 +1,7 @@
 //! The folder of a data set: samples by format, each file whole or not there.
 
 use std::borrow::Cow;
+use std::fs::DirEntry;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
@@ -19,6 +20,8 @@ use crate::output::{self, files};
 
 pub(super) const MANIFEST: &str = "manifest.json";
 const PLAN: &str = "plan.toml";
+/// Samples of a folder, of sets that have more: `train/012/012345.png`.
+const PER_FOLDER: u32 = 1000;
 /// Digits of the numbers in names of files, at least.
 const DIGITS: usize = 6;
 
@@ -92,7 +95,11 @@ impl<'p> Store<'p> {
 
     /// The path of a file that a sample has to itself.
     fn file(&self, part: &Part, number: u32, (format, extension): &(Format, String)) -> PathBuf {
-        self.folder(*format, part.split).join(format!("{}.{extension}", self.name(number)))
+        let mut folder = self.folder(*format, part.split);
+        if self.plan.samples() > PER_FOLDER {
+            folder.push(thousand(number.into()));
+        }
+        folder.join(format!("{}.{extension}", self.name(number)))
     }
 
     fn archive(&self, part: &Part) -> PathBuf {
@@ -187,7 +194,7 @@ impl<'p> Store<'p> {
     fn is_empty(&self) -> bool {
         let this =
             |path: &Path| std::fs::read(path).is_ok_and(|t| t == self.plan.text().as_bytes());
-        let ours = |entry: &std::fs::DirEntry| match entry.file_name().to_string_lossy() {
+        let ours = |entry: &DirEntry| match entry.file_name().to_string_lossy() {
             name if name == PLAN => this(&entry.path()),
             name if hold::shard(&name).is_some() => true,
             name => files::draft_of(&name).is_some_and(|of| [PLAN, MANIFEST].contains(&of)),
@@ -206,9 +213,7 @@ impl<'p> Store<'p> {
     fn remove_unfinished(&self, parts: &[Part]) -> Result<(), DatasetError> {
         for split in 0..self.plan.splits.len() {
             for &format in &self.plan.formats {
-                let folder = self.folder(format, split);
-                let Ok(all) = std::fs::read_dir(&folder) else { continue };
-                for entry in all.flatten() {
+                for entry in within(&self.folder(format, split)) {
                     let name = entry.file_name().to_string_lossy().into_owned();
                     let Some(file) = files::draft_of(&name) else { continue };
                     let (stem, _) = file.split_once('.').unwrap_or((file, ""));
@@ -405,6 +410,20 @@ pub(super) fn picture(bytes: &[u8]) -> Result<GrayImage, png::DecodingError> {
     let mut pixels = vec![0; width as usize * height as usize];
     reader.next_frame(&mut pixels)?;
     Ok(GrayImage::from_raw(width, height, pixels).expect("a byte per pixel"))
+}
+
+/// The folder of a sample's files where a thousand share one.
+pub(super) fn thousand(number: u64) -> String {
+    format!("{:03}", number / u64::from(PER_FOLDER))
+}
+
+/// What lies in a folder of samples, and in those of a thousand each below it.
+pub(super) fn within(folder: &Path) -> Vec<DirEntry> {
+    let entries = |folder: &Path| std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let is_folder = |entry: &DirEntry| entry.file_type().is_ok_and(|kind| kind.is_dir());
+    let (folders, mut all): (Vec<_>, Vec<_>) = entries(folder).partition(is_folder);
+    all.extend(folders.iter().flat_map(|below| entries(&below.path())));
+    all
 }
 
 /// Name of the first fact that differs between the two.

@@ -5,7 +5,7 @@ use std::ops::Range;
 use serde::Deserialize;
 use toml::Table;
 
-use super::plan::{Array, Format, PART, Segmented};
+use super::plan::{Array, Format, PART, Precision, Segmented};
 use crate::scene::SceneError;
 use crate::scene::file::Document;
 use crate::settings::{Quality, suggest};
@@ -26,6 +26,8 @@ pub(super) struct PlanTable {
     pub formats: Vec<Format>,
     #[serde(default)]
     pub arrays: Vec<String>,
+    #[serde(default)]
+    pub precision: Precision,
     #[serde(default = "seen")]
     pub segmentation: Segmented,
     pub samples_per_part: Option<u32>,

@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use super::super::DatasetError;
 use super::super::plan::Format;
-use super::super::store::{MANIFEST, picture};
+use super::super::store::{MANIFEST, picture, within};
 use crate::issue::FileError;
 use image::GrayImage;
 
@@ -177,9 +177,10 @@ impl Set {
 
 /// Files with an ending in a folder, by name.
 fn sorted(folder: &Path, end: &str) -> Vec<PathBuf> {
-    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let entries = within(folder).into_iter();
     let ends = |path: &PathBuf| path.extension().is_some_and(|e| e == end);
     let mut all: Vec<PathBuf> = entries.map(|entry| entry.path()).filter(ends).collect();
-    all.sort();
+    // Numbers in names have as many digits.
+    all.sort_by(|a, b| a.file_name().cmp(&b.file_name()));
     all
 }
