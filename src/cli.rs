@@ -1,9 +1,11 @@
 //! Subcommands, one module each: arguments and execution.
 
+use std::ffi::OsString;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use insonify::output;
+
+use crate::{issue, output};
 
 mod acquire;
 mod check;
@@ -77,19 +79,20 @@ enum Command {
     View(Box<view::View>),
 }
 
-/// The command that is asked for.
-fn command() -> Command {
+/// The command that `arguments` ask for, of which the first is the program's name.
+fn command(arguments: Vec<OsString>) -> Command {
     #[cfg(feature = "window")]
     let bare = || Cli::parse_from(["insonify", "view", "--gallery"]).command;
     #[cfg(not(feature = "window"))]
     let bare = || None;
-    Cli::parse().command.or_else(bare).expect("clap asks for one")
+    Cli::parse_from(arguments).command.or_else(bare).expect("clap asks for one")
 }
 
-/// Runs the command line. An error is printed once, with its remedy; the exit code is then 1.
-pub fn run() -> ExitCode {
-    insonify::issue::tell_errors();
-    output::exit(match command() {
+/// Runs the command line of `arguments`, of which the first is the program's name, and returns the exit code. An error is
+/// printed once, with its remedy; the code is then 1. Arguments that are wrong, `--help` and `--version` end the process.
+pub fn run(arguments: Vec<OsString>) -> ExitCode {
+    issue::tell_errors();
+    output::exit(match command(arguments) {
         Command::Acquire(args) => acquire::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Check(check) => check.run(),
         Command::Dataset(args) => dataset::run(&args).map(|()| ExitCode::SUCCESS),
@@ -111,7 +114,7 @@ pub fn run() -> ExitCode {
 #[cfg(test)]
 mod tests {
     use super::EXAMPLES;
-    use insonify::scene::shipped;
+    use crate::scene::shipped;
 
     #[test]
     fn the_help_names_the_scenes_that_ship() {

@@ -1,7 +1,12 @@
 //! insonify: real-time ultrasound by Monte-Carlo path tracing on Vulkan.
 //!
 //! `scene` and `probe` describe the anatomy and the instrument; `gpu` knows Vulkan and no ultrasound;
-//! `sim` is the frame, `view` the window. Units: mm, microseconds, MHz.
+//! `sim` is the frame, `view` the window, `cli` the command line. Units: mm, microseconds, MHz.
+
+// The command line names what everybody else does.
+extern crate self as insonify;
+
+pub mod cli;
 
 pub use insonify_base::{issue, random, statistics};
 pub use insonify_gpu as gpu;

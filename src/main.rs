@@ -1,10 +1,8 @@
-//! The `insonify` command: parse, run, print one error, exit code.
+//! The `insonify` command.
 
 use std::process::ExitCode;
 
-mod cli;
-
 fn main() -> ExitCode {
     insonify::gpu::prepare_process();
-    cli::run()
+    insonify::cli::run(std::env::args_os().collect())
 }

@@ -35,12 +35,14 @@ sys.exit(_insonify.compile_standard_input())
 from . import poses  # noqa: E402
 from ._insonify import Frame, InsonifyError, Scene, SceneError, devices  # noqa: E402
 from .datasets import make_dataset  # noqa: E402
+from .doppler import Doppler, Spectrum  # noqa: E402
 from .files import save  # noqa: E402
 from .importing import import_labels  # noqa: E402
 from .simulator import Frames, LoopFrame, Simulator  # noqa: E402
 
 __version__ = _insonify.__version__
 __all__ = [
+    "Doppler",
     "Frame",
     "Frames",
     "InsonifyError",
@@ -48,6 +50,7 @@ __all__ = [
     "Scene",
     "SceneError",
     "Simulator",
+    "Spectrum",
     "devices",
     "import_labels",
     "make_dataset",

@@ -102,6 +102,10 @@ def forked() -> None:
 def set_compiler(program: str, arguments: list[str]) -> None:
     """Names a program that compiles kernels in a process of its own, by compile_standard_input; import does."""
 
+def run_command(arguments: Sequence[str]) -> int:
+    """Runs the command line of these arguments, of which the first is the program's name, in this process, which is to end
+    with the exit code that it returns. Wrong arguments, --help and --version end it at once."""
+
 def compile_standard_input() -> int:
     """Compiles the kernel that standard input describes; returns the exit code."""
 
@@ -302,6 +306,12 @@ class Simulator:
 
         What moved, labels say as if the anatomy had moved before each of them.
         """
+    def coloured(
+        self, mode: str, pose: ArrayLike | None, time: float | None, seed: int | None, number: int
+    ) -> dict[str, Any]:
+        """As Simulator.doppler, which has the defaults."""
+    def spectral(self, pose: ArrayLike | None, time: float | None, seed: int | None, number: int) -> dict[str, Any]:
+        """As Simulator.spectrum, which has the defaults."""
     @property
     def scene(self) -> Scene:
         """The scene that is simulated."""

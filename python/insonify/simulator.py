@@ -7,12 +7,13 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from os import PathLike
-from typing import TYPE_CHECKING, Any, SupportsIndex, overload
+from typing import TYPE_CHECKING, Any, Literal, SupportsIndex, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from . import _insonify
+from .doppler import Doppler, Spectrum
 
 if TYPE_CHECKING:
     from ._insonify import Want
@@ -213,6 +214,37 @@ class Simulator(_insonify.Simulator):
             rows.pop("bmode"), rows.pop("pose"), first.axes, first.sector, rows, labels, legend, first.probe,
             first.extent, first.sampling_frequency, timings, took,
         )
+
+
+    def doppler(
+        self,
+        mode: Literal["color", "power", "tdi"] = "color",
+        pose: ArrayLike | None = None,
+        time: float | None = None,
+        seed: int | None = None,
+        *,
+        number: int = 0,
+    ) -> Doppler:
+        """Images the scene and a packet of pulses of the box of its `[doppler]`: velocities of blood ("color"), its power, or
+        velocities of tissue by `[tissue_doppler]` ("tdi"). pose, time, seed, number: as of `frame`.
+
+        ValueError: settings that no packet can have, with the key. InsonifyError: the device fails.
+        """
+        return Doppler(**self.coloured(mode, pose, time, seed, number))
+
+    def spectrum(
+        self,
+        pose: ArrayLike | None = None,
+        time: float | None = None,
+        seed: int | None = None,
+        *,
+        number: int = 0,
+    ) -> Spectrum:
+        """Records the gate of the scene's `[spectral]`, for its `duration` from `time` on: pulsed or continuous wave.
+
+        ValueError: settings that no gate can have, with the key. KeyboardInterrupt: it ends within 500 pulses.
+        """
+        return Spectrum(**self.spectral(pose, time, seed, number))
 
 
 def _end(start: int, most: int, times: Sequence[float] | None, labels: bool) -> int:

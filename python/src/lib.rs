@@ -8,6 +8,7 @@
 
 mod arrays;
 mod dataset;
+mod doppler;
 mod error;
 mod frame;
 mod importing;
@@ -25,6 +26,8 @@ mod skin;
 mod state;
 mod toml;
 mod written;
+
+use std::process::ExitCode;
 
 use insonify::gpu;
 use pyo3::prelude::*;
@@ -70,6 +73,13 @@ fn compile_standard_input(py: Python<'_>) -> u8 {
     py.detach(gpu::compile_standard_input)
 }
 
+/// Runs the command line of these arguments, of which the first is the program's name, in this process, which is to end
+/// with the exit code that it returns. Wrong arguments, --help and --version end it at once.
+#[pyfunction]
+fn run_command(py: Python<'_>, arguments: Vec<std::ffi::OsString>) -> u8 {
+    u8::from(py.detach(|| insonify::cli::run(arguments)) != ExitCode::SUCCESS)
+}
+
 #[pymodule]
 fn _insonify(module: &Bound<'_, PyModule>) -> PyResult<()> {
     let py = module.py();
@@ -89,6 +99,7 @@ fn _insonify(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(importing::import_labels, module)?)?;
     module.add_function(wrap_pyfunction!(devices, module)?)?;
     module.add_function(wrap_pyfunction!(set_compiler, module)?)?;
+    module.add_function(wrap_pyfunction!(run_command, module)?)?;
     module.add_function(wrap_pyfunction!(process::forked, module)?)?;
     module.add_function(wrap_pyfunction!(compile_standard_input, module)?)?;
     module.add_function(wrap_pyfunction!(driver_environment, module)?)

@@ -100,20 +100,54 @@ impl Running {
         wanted: &[Wanted],
         together: &Together,
     ) -> PyResult<Vec<Taken>> {
-        let own = state.scene.simulation.clone();
-        state.at(together.time.unwrap_or(state.time));
-        state.scene.simulation.labels |= together.kinds.contains(&ArrayKind::Labels);
+        self.prepared(state, together.time, None, |running, state| {
+            state.scene.simulation.labels |= together.kinds.contains(&ArrayKind::Labels);
+            running.taken(&state.scene, state.generation, wanted, &together.kinds)
+        })
+    }
+
+    /// Acts with the scene at a time, at the pose and with the seed that are wanted, and with the quality of this simulation;
+    /// the scene is then what it was.
+    pub fn prepared<T>(
+        &mut self,
+        state: &mut State,
+        time: Option<f64>,
+        wanted: Option<Wanted>,
+        act: impl FnOnce(&mut Self, &mut State) -> PyResult<T>,
+    ) -> PyResult<T> {
+        let (own, pose) = (state.scene.simulation.clone(), state.scene.world_from_probe);
+        state.at(time.unwrap_or(state.time));
+        if let Some(Wanted { pose, seed, .. }) = wanted {
+            state.scene.world_from_probe = pose.unwrap_or(state.scene.world_from_probe);
+            state.scene.simulation.seed = seed.unwrap_or(own.seed);
+        }
         if let Some(quality) = self.quality {
             let machine = sim::machine(&self.device);
             let by_hand: Vec<String> = state.by_hand().map(str::to_owned).collect();
             let by_hand = by_hand.iter().map(String::as_str);
             state.scene.simulation.set_quality_except(quality, machine, by_hand);
         }
-        let taken = self.taken(&state.scene, state.generation, wanted, &together.kinds);
-        state.scene.simulation = own;
-        let time = state.time;
-        state.at(time);
-        taken
+        let done = act(self, state);
+        (state.scene.simulation, state.scene.world_from_probe) = (own, pose);
+        state.at(state.time);
+        done
+    }
+
+    /// The image of the scene as it is, of which nothing else is read.
+    pub fn image(&mut self, state: &State, number: u32) -> PyResult<Picture> {
+        let scene = &state.scene;
+        let shot = sim::Shot::of(scene, number);
+        self.frame(scene, state.generation, &[shot])?;
+        let passes = self.passes(1)?;
+        let picture = self.picture(scene, 0, &shot, passes)?;
+        // Packets take the place of what else there is of it.
+        self.held = 0;
+        Ok(picture)
+    }
+
+    /// The simulator that has been made.
+    pub fn opened(&mut self) -> &mut sim::Simulator {
+        &mut self.made.as_mut().expect("it was made").simulator
     }
 
     fn taken(
@@ -200,7 +234,7 @@ impl Running {
     }
 
     /// The simulator, made anew where the anatomy is another one, with room for the scene's settings.
-    fn simulator(
+    pub fn simulator(
         &mut self,
         scene: &scene::Scene,
         generation: u64,

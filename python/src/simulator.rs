@@ -4,9 +4,10 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 
 use insonify::gpu::{Device, DeviceOptions, GpuError, cache_folder};
 use insonify::settings::{Quality, Words};
-use insonify::sim::Tracer;
+use insonify::sim::{ColourMode, Tracer};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 
 use crate::arrays;
 use crate::error::{InsonifyError, raised};
@@ -14,6 +15,7 @@ use crate::frame::{ArrayKind, Contents, Frame};
 use crate::process;
 use crate::running::{Running, Taken, Together, Wanted};
 use crate::scene::Scene;
+use crate::state::State;
 
 #[pyclass(frozen, subclass, module = "insonify")]
 pub struct Simulator {
@@ -39,6 +41,28 @@ impl Simulator {
             Frame::new(Some(slf.clone().unbind()), number, picture, contents)
         };
         Ok(taken.into_iter().map(frame).collect())
+    }
+
+    /// What `hear` has of the scene at a pose and a time, while Python goes on.
+    fn heard<T: Send>(
+        &self,
+        py: Python<'_>,
+        pose: Option<&Bound<'_, PyAny>>,
+        time: Option<f64>,
+        seed: Option<i64>,
+        number: u32,
+        hear: impl FnOnce(&mut Running, &mut State, Wanted, Option<f64>) -> PyResult<T> + Send,
+    ) -> PyResult<T> {
+        let pose = pose.map(arrays::pose).transpose()?;
+        let seed = seed.map(seed_of).transpose()?;
+        let time = time.map(seconds).transpose()?;
+        let mut running = self.running()?;
+        let running = running.as_mut().expect("checked");
+        let state = Arc::clone(&self.scene.get().state);
+        py.detach(|| {
+            let mut state = state.lock().unwrap_or_else(PoisonError::into_inner);
+            hear(running, &mut state, Wanted { pose, seed, number }, time)
+        })
     }
 
     /// The simulation, open or closed, if no other thread has it.
@@ -230,6 +254,46 @@ impl Simulator {
         let wanted = (0..count).map(wanted).collect::<PyResult<Vec<_>>>()?;
         let together = Together { time: time.map(seconds).transpose()?, kinds: want.kinds()? };
         Self::made(&slf, wanted, together)
+    }
+
+    /// As Simulator.doppler, which has the defaults.
+    #[pyo3(signature = (mode, pose, time, seed, number))]
+    fn coloured<'py>(
+        &self,
+        py: Python<'py>,
+        mode: &str,
+        pose: Option<&Bound<'_, PyAny>>,
+        time: Option<f64>,
+        seed: Option<i64>,
+        number: u32,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let mode = one_of(
+            "mode",
+            mode,
+            &[
+                ("color", ColourMode::Color),
+                ("power", ColourMode::Power),
+                ("tdi", ColourMode::Tissue),
+            ],
+        )?;
+        let made = self.heard(py, pose, time, seed, number, |running, state, wanted, time| {
+            running.coloured(state, wanted, time, mode)
+        })?;
+        made.facts(py)
+    }
+
+    /// As Simulator.spectrum, which has the defaults.
+    #[pyo3(signature = (pose, time, seed, number))]
+    fn spectral<'py>(
+        &self,
+        py: Python<'py>,
+        pose: Option<&Bound<'_, PyAny>>,
+        time: Option<f64>,
+        seed: Option<i64>,
+        number: u32,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let made = self.heard(py, pose, time, seed, number, Running::spectral)?;
+        made.facts(py)
     }
 
     /// The scene that is simulated.

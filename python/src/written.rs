@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use insonify::scene::file::quoted;
+use insonify::scene::file::{LISTS, quoted};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyString};
@@ -21,11 +21,10 @@ pub struct Written {
 impl Written {
     pub fn new(tables: &Bound<'_, PyDict>) -> PyResult<Self> {
         let mut out = Self { text: String::new(), given: BTreeMap::new() };
-        let lists = ["mesh", "wire", "group", "transform", "selector"];
         let mut behind = String::new();
         for (key, value) in tables {
             let key: String = key.extract()?;
-            if !lists.contains(&key.as_str()) {
+            if !LISTS.contains(&key.as_str()) {
                 out.text += &format!("{} = {}\n", quoted(&key), toml::text(&value)?);
                 continue;
             }

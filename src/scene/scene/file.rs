@@ -39,8 +39,8 @@ mod trajectory;
 mod vary;
 
 pub use again::SceneFile;
-pub use document::quoted;
 pub use document::{Document, Source};
+pub use document::{LISTS, quoted};
 pub use error::SceneError;
 pub use known::{default, facts, keys_below, paths, value, value_of_settings};
 pub use paper::paper;

@@ -15,10 +15,11 @@ use super::error::{SceneError, advice};
 use crate::scene::mesh::Mesh;
 use crate::scene::shipped;
 use crate::settings::{Facts, Value};
+pub use paths::LISTS;
 pub use paths::Misfit;
+pub(super) use paths::element;
 pub use paths::quoted;
 pub(crate) use paths::segments;
-pub(super) use paths::{LISTS, element};
 use paths::{find, insert};
 
 /// Largest scene file, bytes: they hold names and numbers, not meshes.
