@@ -38,22 +38,24 @@ struct Scatterers {
     uint number;         // of the generation; 0 where nothing flows
 };
 
-// Scatterers of one lattice of deformed tissue between two distances. Cells are found where the piece lies
-// in the reference shape: by the affine map at its middle, in a box that the map's error widens. Each scatterer
-// then echoes from its true place, in the piece that holds it.
-uvec3 march_piece(Stretch s, Scatterers group, int number, vec2 x, float drowned) {
-    Lattice lattice = lattice_of(s.tissue, number);
-    // Each generation has scatterers of its own.
-    lattice.key += uvec3(group.number * GENERATION_KEY);
-    float h = lattice.edge, inverse_h = lattice.inverse_edge;
+// Where a piece of a stretch lies in the reference shape, whichever lattice is searched there.
+struct Piece {
+    vec3 middle;                        // of the stretch between both distances
+    vec3 d;                             // the beam's direction
+    vec3 centre, half_size, miss;       // of the box that the affine map makes, and by how much its error widens it
+    vec3 along, across, up;             // from offsets in it to those along the beam's axes
+    float growth;                       // of volumes
+};
+
+// The piece between two distances, whose strip is `width` to either side at most.
+Piece piece_of(Stretch s, Motion motion, vec2 x, float width) {
+    Piece piece;
     float half_length = 0.5 * (x.y - x.x);
     vec3 here = s.o + (x.x + half_length) * s.d;
-    vec3 p = rest_of(group.motion, here);
+    vec3 p = rest_of(motion, here);
     mat3 jacobian;
-    vec3 back = here - p - moved(group.motion, p, jacobian);
+    vec3 back = here - p - moved(motion, p, jacobian);
     vec3 middle = p + undeform(jacobian, back);
-    float width = 1.1 * end_width(s, x);
-    if (!(width > 0.0)) return uvec3(0u);
     float reach = slab_of().y;
 
     vec3 along = s.d * jacobian, across = s.e_l * jacobian, up = s.e_e * jacobian;
@@ -67,14 +69,35 @@ uvec3 march_piece(Stretch s, Scatterers group, int number, vec2 x, float drowned
         vec3 off = side.x * d + side.y * el + side.z * ee;
         mat3 unused;
         vec3 at = middle + off;
-        vec3 to = at + moved(group.motion, at, unused) - here;
+        vec3 to = at + moved(motion, at, unused) - here;
         vec3 miss = vec3(dot(to, s.d) - dot(off, along), dot(to, s.e_l) - dot(off, across), dot(to, s.e_e) - dot(off, up));
         least = min(least, miss);
         most = max(most, miss);
     }
     vec3 shift = -0.5 * (least + most);
-    vec3 half_box = half_size + min(most - least + 1e-3 * h, vec3(half_length + reach));
-    vec3 centre = middle + shift.x * d + shift.y * el + shift.z * ee;
+    piece.middle = middle;
+    piece.d = d;
+    piece.centre = middle + shift.x * d + shift.y * el + shift.z * ee;
+    piece.half_size = half_size;
+    piece.miss = most - least;
+    piece.along = along;
+    piece.across = across;
+    piece.up = up;
+    piece.growth = abs(dot(jacobian[0], cross(jacobian[1], jacobian[2])));
+    return piece;
+}
+
+// Scatterers of one lattice of deformed tissue in a piece. Cells are found where the piece lies
+// in the reference shape: by the affine map at its middle, in a box that the map's error widens. Each scatterer
+// then echoes from its true place, in the piece that holds it.
+uvec3 march_piece(Stretch s, Scatterers group, Piece piece, int number, vec2 x, float drowned) {
+    Lattice lattice = lattice_of(s.tissue, number);
+    // Each generation has scatterers of its own.
+    lattice.key += uvec3(group.number * GENERATION_KEY);
+    float h = lattice.edge, inverse_h = lattice.inverse_edge;
+    float half_length = piece.half_size.x;
+    vec3 along = piece.along, across = piece.across, up = piece.up, centre = piece.centre;
+    vec3 half_box = piece.half_size + min(piece.miss + 1e-3 * h, vec3(half_length + piece.half_size.z));
 
     Walk walk = walk_of(along, across, up);
     float high = half_box.z + 0.51 * h * dot(abs(up), vec3(1.0));
@@ -88,8 +111,7 @@ uvec3 march_piece(Stretch s, Scatterers group, int number, vec2 x, float drowned
     vec3 rest = fma(-nearest, vec3(h), centre);
     ivec3 base = ivec3(nearest);
     // Squeezed tissue keeps its echo level though its scatterers are closer together.
-    float growth = abs(dot(jacobian[0], cross(jacobian[1], jacobian[2])));
-    float strength = group.weight * lattice.amplitude * s.weight * frame.volume_scale * sqrt(clamp(growth, LEAST_GROWTH, 1.0 / LEAST_GROWTH));
+    float strength = group.weight * lattice.amplitude * s.weight * frame.volume_scale * sqrt(clamp(piece.growth, LEAST_GROWTH, 1.0 / LEAST_GROWTH));
     float depth = tissues[s.tissue].texture_depth, length_inverse = 1.0 / tissues[s.tissue].texture_length;
     ivec3 step_a = unit_step(walk.a), step_b = unit_step(walk.b), step_c = unit_step(walk.c);
     float planes = far / abs(walk.step);
@@ -130,7 +152,7 @@ uvec3 march_piece(Stretch s, Scatterers group, int number, vec2 x, float drowned
             vec3 from = rest_at + moved(group.motion, rest_at, unused) - s.o;
             if (depth > 0.0) {
                 // That of the axis beside the scatterer, as in march_planes.
-                vec3 on_axis = middle + (dot(from, s.d) - x.x - half_length) * d;
+                vec3 on_axis = piece.middle + (dot(from, s.d) - x.x - half_length) * piece.d;
                 signed_strength *= 1.0 + depth * tissue_texture(on_axis * length_inverse, tissues[s.tissue].seed);
             }
             count.yz += hear(s, from, signed_strength, number, x, drowned);
@@ -142,6 +164,8 @@ uvec3 march_piece(Stretch s, Scatterers group, int number, vec2 x, float drowned
 // Scatterers of the lattices from one number to another: of both generations where something flows, and of one for a pulse.
 uvec3 march_generations(Stretch s, ivec2 numbers, vec2 x, float drowned) {
     uvec3 count = uvec3(0u);
+    float width = 1.1 * end_width(s, x);
+    if (!(width > 0.0)) return count;
     Scatterers group = Scatterers(Motion(NONE, 0.0, field_of(s.instance)), 1.0, 0u);
     uint flow = flows(s) ? flow_of(s.instance) : 0u;
     bool pulse = (push.part & PART_PULSE) != 0u;
@@ -153,7 +177,8 @@ uvec3 march_generations(Stretch s, ivec2 numbers, vec2 x, float drowned) {
             group.weight = pulse ? 1.0 : head.x;
             group.number = uint(whole(head.y));
         }
-        for (int number = numbers.x; number <= numbers.y; ++number) count += march_piece(s, group, number, x, drowned);
+        Piece piece = piece_of(s, group.motion, x, width);
+        for (int number = numbers.x; number <= numbers.y; ++number) count += march_piece(s, group, piece, number, x, drowned);
     }
     return count;
 }

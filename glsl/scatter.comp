@@ -341,16 +341,20 @@ ivec2 work_of(Stretch s, bool voxel) {
     }
     ivec2 passed = bins_of(s);
     int window = int(window_begin / SCATTER_BIN);
-    // In deformed tissue a bin has the scatterers that lie in it, and only those nearest to its end echo in the next one.
-    ivec2 beside = mix(ivec2(BESIDE), ivec2(1, 0), bvec2(deforms(s)));
-    int first = max(passed.x, max(window, first_heard / int(SCATTER_BIN)) - beside.x);
-    int last = min(passed.y, min(window + int(BINS) - 1, last_heard / int(SCATTER_BIN)) + beside.y);
-    int items = int(items_of(s));
-    return ivec2(first * items, max(last - first + 1, 0) * items);
+    if (deforms(s)) {
+        // A piece has the scatterers that lie in it, and only those nearest to its end echo behind it.
+        int items = int(items_of(s)), piece = int(frame.piece);
+        int first = max(passed.x * items, (max(int(window_begin), first_heard) - 1) / piece);
+        int last = min(passed.y * items + items - 1, min(int(window_begin + SCATTER_WINDOW) - 1, last_heard) / piece);
+        return ivec2(first, max(last - first + 1, 0));
+    }
+    int first = max(passed.x, max(window, first_heard / int(SCATTER_BIN)) - BESIDE);
+    int last = min(passed.y, min(window + int(BINS) - 1, last_heard / int(SCATTER_BIN)) + BESIDE);
+    return ivec2(first, max(last - first + 1, 0));
 }
 
 void main() {
-    uint scanline = gl_WorkGroupID.x;
+    uint scanline = frame.echo_first + gl_WorkGroupID.x;
     uint thread = gl_LocalInvocationID.x;
     window_begin = gl_WorkGroupID.z * SCATTER_WINDOW;
     bool voxel = (frame.flags & FLAG_VOXEL) != 0u;
@@ -373,15 +377,16 @@ void main() {
     find_heard(scanline, thread, THREADS);
     uint available = line_end[frame.layers - 1u];
 
-    // Masking: the level of the loudest stretch in each slot, of all layers.
+    // Masking: the level of the loudest stretch in each slot, of all layers, for the bins that may echo in what is heard.
     // If there are few stretches, several threads share one.
+    ivec2 asked = (ivec2(first_heard, last_heard) / int(SCATTER_BIN) + ivec2(-BESIDE, BESIDE + 1)) * int(SLOTS);
     uint sharing = THREADS / clamp(available, 1u, THREADS);
     for (uint i = thread / sharing; i < available && !voxel; i += THREADS / sharing) {
         Stretch s = world_stretch(stretch_at(scanline, i));
         ivec2 filled = sounds(s) ? slots_of(s) : ivec2(0, -1);
         int window = int(window_begin / SCATTER_SLOT) - SLOTS_BESIDE;
-        int last = min(filled.y, window + int(BINS * SLOTS) + 2 * SLOTS_BESIDE - 1);
-        for (int slot = max(filled.x, window) + int(thread % sharing); slot <= last; slot += int(sharing)) {
+        int last = min(min(filled.y, asked.y - 1), window + int(BINS * SLOTS) + 2 * SLOTS_BESIDE - 1);
+        for (int slot = max(max(filled.x, asked.x), window) + int(thread % sharing); slot <= last; slot += int(sharing)) {
             float level = level_at(s, distance_at(s, (float(slot) + 0.5) * float(SCATTER_SLOT)));
             atomicMax(loudest[slot - window], whole_large(clamp(floor(level * LEVEL_UNIT), float(SILENT), 1e9)));
         }

@@ -45,11 +45,11 @@ pub const SCATTER: Pass = Pass {
 /// longer than 1.
 const MOST_PARTS: u32 = 4;
 
-/// Work groups per scanline, part of its segments, and window of its samples, for a device that runs about `at_once`
+/// Work groups per scanline that is heard, part of its segments, and window of its samples, for a device that runs about `at_once`
 /// groups at once. Long lists of segments are divided among groups, and so are short ones where they leave more than half
 /// of the device idle; each group clears and writes its own window.
 pub fn extent(frame: &Frame, at_once: u32) -> Extent {
-    let lines = frame.scanlines;
+    let lines = frame.echo_lines;
     let windows = frame.samples.div_ceil(SCATTER_WINDOW);
     let paths = frame.segment_capacity / per_path(frame);
     let long = paths.div_ceil(8).clamp(1, 16);
@@ -64,7 +64,7 @@ mod tests {
     #[test]
     fn segments_are_divided_where_a_device_would_be_idle() {
         let frame =
-            Frame { scanlines: 192, samples: 2048, segment_capacity: 64, ..Frame::default() };
+            Frame { echo_lines: 192, samples: 2048, segment_capacity: 64, ..Frame::default() };
         let groups = |frame: &Frame, at_once| match extent(frame, at_once) {
             Extent::Groups(groups) => groups,
             Extent::Threads(_) => unreachable!("work groups"),
