@@ -3,6 +3,10 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
+use dicom_core::Tag;
+use dicom_dictionary_std::tags;
+use dicom_object::{InMemDicomObject, open_file};
+
 use crate::common::vessel::VESSEL;
 
 /// The table of the probe, before the vessel.
@@ -194,11 +198,110 @@ translate = [0, 0, 20]
     assert!((coming - 11.08).abs() < 1.0, "{coming}");
 }
 
+/// A number of a DICOM data set.
+fn number(data: &InMemDicomObject, tag: Tag) -> f64 {
+    data.element(tag).expect("there").to_float64().expect("a number")
+}
+
+/// The regions of a DICOM file.
+fn regions(file: &Path) -> Vec<InMemDicomObject> {
+    let file = open_file(file).expect("DICOM");
+    let regions = file.element(tags::SEQUENCE_OF_ULTRASOUND_REGIONS).expect("there");
+    regions.items().expect("a sequence").to_vec()
+}
+
+/// Codes: PS3.3, C.8.5.5.1.
+#[test]
+fn dicom_says_where_the_colours_lie_and_what_the_pixels_of_spectra_are() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let made = |name: &str, more: &[&str]| {
+        let out = render(folder.path(), name, more);
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        folder.path().join(name)
+    };
+    let picture = made("a.png", &["--mode", "color"]);
+    let file = made("a.dcm", &["--mode", "color"]);
+    let open = open_file(&file).expect("DICOM");
+    let rgb = open.element(tags::PIXEL_DATA).expect("pixels").to_bytes().expect("bytes");
+    let shown = image::open(picture).expect("a picture").to_rgb8();
+    let (width, _) = shown.dimensions();
+    assert_eq!(&*rgb, shown.as_raw(), "the colours of the picture");
+    let all = regions(&file);
+    let [tissue, flow] = all.as_slice() else { panic!("{} regions", all.len()) };
+    assert_eq!([tissue, flow].map(|r| number(r, tags::REGION_DATA_TYPE)), [1.0, 2.0]);
+    // Colours lie over tissue.
+    assert_eq!([tissue, flow].map(|r| number(r, tags::REGION_FLAGS)), [1.0, 0.0]);
+    let edges = [
+        tags::REGION_LOCATION_MIN_X0,
+        tags::REGION_LOCATION_MIN_Y0,
+        tags::REGION_LOCATION_MAX_X1,
+        tags::REGION_LOCATION_MAX_Y1,
+    ]
+    .map(|tag| number(flow, tag) as u32);
+    // No colour beyond its box, and some beside each of its upright edges, at which the vessel enters and leaves.
+    let coloured = |x: u32, y: u32| {
+        let [r, g, _] = shown.get_pixel(x, y).0;
+        r != g
+    };
+    let columns: Vec<u32> =
+        (0..width).filter(|x| (0..shown.height()).any(|y| coloured(*x, y))).collect();
+    let [first, last] = [columns[0], columns[columns.len() - 1]];
+    assert!(first.abs_diff(edges[0]) <= 2 && last.abs_diff(edges[2]) <= 2, "{columns:?} {edges:?}");
+    // Both regions have the same places: a reference pixel counts from its region's own corner.
+    for (reference, corner, value, delta) in [
+        (
+            tags::REFERENCE_PIXEL_X0,
+            tags::REGION_LOCATION_MIN_X0,
+            tags::REFERENCE_PIXEL_PHYSICAL_VALUE_X,
+            tags::PHYSICAL_DELTA_X,
+        ),
+        (
+            tags::REFERENCE_PIXEL_Y0,
+            tags::REGION_LOCATION_MIN_Y0,
+            tags::REFERENCE_PIXEL_PHYSICAL_VALUE_Y,
+            tags::PHYSICAL_DELTA_Y,
+        ),
+    ] {
+        let origin = |r: &InMemDicomObject| {
+            number(r, value) - number(r, delta) * (number(r, corner) + number(r, reference))
+        };
+        assert!((origin(tissue) - origin(flow)).abs() < 1e-9);
+    }
+    assert!(number(flow, tags::PULSE_REPETITION_FREQUENCY) > 100.0);
+
+    let set = ["spectral.duration=0.1 s", "spectral.depth=20 mm", "spectral.angle=60 deg"];
+    let set = set.iter().flat_map(|set| ["--set", *set]);
+    for (mode, kind) in [("pw", 3.0), ("cw", 4.0)] {
+        let more: Vec<&str> = ["--mode", mode].into_iter().chain(set.clone()).collect();
+        let json = folder.path().join("spectrum.json");
+        let more = [&more[..], &["--json", json.to_str().expect("plain")]].concat();
+        let file = made("s.dcm", &more);
+        let all = regions(&file);
+        let [region] = all.as_slice() else { panic!("{} regions", all.len()) };
+        assert_eq!(number(region, tags::REGION_SPATIAL_FORMAT), 3.0);
+        assert_eq!(number(region, tags::REGION_DATA_TYPE), kind);
+        // Seconds and cm/s.
+        assert_eq!(number(region, tags::PHYSICAL_UNITS_X_DIRECTION), 4.0);
+        assert_eq!(number(region, tags::PHYSICAL_UNITS_Y_DIRECTION), 7.0);
+        assert!((number(region, tags::DOPPLER_CORRECTION_ANGLE) - 60.0).abs() < 1e-9);
+        let said: serde_json::Value =
+            serde_json::from_str(&std::fs::read_to_string(json).expect("there")).expect("JSON");
+        let of = |key: &str, end: usize| said["spectrum"][key][end].as_f64().expect("a number");
+        let last = |tag: Tag| number(region, tag);
+        let right = last(tags::REFERENCE_PIXEL_PHYSICAL_VALUE_X)
+            + last(tags::PHYSICAL_DELTA_X) * last(tags::REGION_LOCATION_MAX_X1);
+        let lowest = last(tags::REFERENCE_PIXEL_PHYSICAL_VALUE_Y)
+            + last(tags::PHYSICAL_DELTA_Y) * last(tags::REGION_LOCATION_MAX_Y1);
+        assert!((right - of("time_s", 1)).abs() < 1e-6, "{right}");
+        assert!((10.0 * lowest - of("velocity_mm_per_s", 1)).abs() < 1e-3, "{lowest}");
+    }
+}
+
 #[test]
 fn mistakes_in_doppler_have_a_remedy() {
     let folder = tempfile::tempdir().expect("a folder");
     for (name, more, cause, remedy) in [
-        ("a.gif", vec![], "holds grey images", ".png"),
+        ("a.uff", vec![], "holds grey images", ".png"),
         ("a.png", vec!["doppler.prf=30 kHz"], "take longer than", "at most 24062 Hz"),
         ("a.png", vec!["doppler.prf=5 Hz"], "prf is 5 Hz", "between"),
         (

@@ -59,12 +59,13 @@ pub fn save_film(
         corner: [left, top],
         frequency: probe.frequency,
         transducer: exchange::transducer(&probe),
+        colours: None,
         study: None,
     };
     let rate = count as f64 / ends[count - 1];
     let grey = images.as_slice()?;
     let made = || -> Result<bool, FilmError> {
-        let Some(mut film) = Film::of(&path, rate, || about)? else { return Ok(false) };
+        let Some(mut film) = Film::of(&path, rate, false, || about)? else { return Ok(false) };
         for (image, end) in grey.chunks_exact(height * width).zip(&ends) {
             film.add([width as u32, height as u32], &rgba(image), *end)?;
         }

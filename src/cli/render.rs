@@ -339,16 +339,16 @@ fn simulate(
 ) -> Result<(Vec<FrameTimings>, Map<String, Value>)> {
     let frames = moments.len() as u32;
     let shown = args.fps.or_else(|| pace(args, &moments)).unwrap_or(SHOWN);
-    let mut film = Film::new(output, simulator, scene, &moments, shown, sidecar)?;
-    let labels = args.labels.as_ref().map(|path| LabelFiles::new(path, frames)).transpose()?;
-    let mut progress = Progress::new(frames, "frames");
-    let mut timings = Vec::new();
-    let mut unseen = scene.masks_off_the_image();
     // Packets are made one by one, each behind its image.
     let colours = match args.mode.map(Mode::product) {
         Some(Product::Coloured(colours)) => Some(colours),
         _ => None,
     };
+    let mut film = Film::new(output, simulator, scene, &moments, shown, colours, sidecar)?;
+    let labels = args.labels.as_ref().map(|path| LabelFiles::new(path, frames)).transpose()?;
+    let mut progress = Progress::new(frames, "frames");
+    let mut timings = Vec::new();
+    let mut unseen = scene.masks_off_the_image();
     let at_once = if colours.is_some() { 1 } else { simulator.most_shots() };
     for group in groups(&moments, scene, at_once) {
         reload(simulator, library);

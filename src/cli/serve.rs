@@ -151,6 +151,8 @@ fn state(scene: &Scene) -> (DAffine3, Vec<Placed>) {
 #[derive(Default)]
 struct Notices {
     tracker: String,
+    /// Time of that report.
+    tracked: Option<Instant>,
     /// Reason for which nothing moves the probe; empty without one.
     silence: String,
     status: Status,
@@ -158,7 +160,8 @@ struct Notices {
 }
 
 impl Notices {
-    /// Reports news of the tracker at once, of clients and errors once a second.
+    /// Reports news of the tracker at once, but no more than once a second: a tool that is seen in every other message is
+    /// neither lost nor found as often. So are clients and errors.
     fn update(&mut self, server: &Server) {
         let tracker = match server.pose() {
             TrackerState::Never => String::new(),
@@ -167,11 +170,12 @@ impl Notices {
                 format!("tracker: {} is lost; the probe stays", pose.device)
             }
         };
-        if tracker != self.tracker {
+        let recent = |at: Option<Instant>| at.is_some_and(|at| at.elapsed() < NOTICE_PERIOD);
+        if tracker != self.tracker && !recent(self.tracked) {
             output::note(&tracker);
-            self.tracker = tracker;
+            (self.tracker, self.tracked) = (tracker, Some(Instant::now()));
         }
-        if self.at.is_some_and(|at| at.elapsed() < NOTICE_PERIOD) {
+        if recent(self.at) {
             return;
         }
         self.at = Some(Instant::now());

@@ -8,6 +8,7 @@ pub mod trace;
 
 use std::ops::Range;
 
+use crate::output::dicom::ColourBox;
 use crate::probe::Probe;
 use crate::scene::Scene;
 use crate::settings::Doppler;
@@ -45,6 +46,22 @@ pub fn make_packet(
         }
     }
     Ok(packet)
+}
+
+/// Where the box of these settings lies over an image, and how fast its pulses follow each other.
+pub fn shown(probe: &Probe, doppler: &Doppler) -> ColourBox {
+    let mut edges = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
+    // Arcs of a sector are farthest out at their ends or where they cross its middle.
+    let middle = 0.5_f64.clamp(doppler.left, doppler.right.max(doppler.left));
+    for across in [doppler.left, middle, doppler.right] {
+        let (origin, direction) = probe.ray_across(across - 0.5);
+        for down in [doppler.top, doppler.bottom] {
+            let at = origin + direction * (down * probe.depth);
+            edges =
+                [edges[0].min(at.x), edges[1].min(at.z), edges[2].max(at.x), edges[3].max(at.z)];
+        }
+    }
+    ColourBox { edges, prf: doppler.prf }
 }
 
 /// The packet of the box of these settings.

@@ -113,7 +113,8 @@ impl Simulator {
         assert!(samples.start < samples.end && samples.end <= probe.samples, "samples {samples:?}");
         self.adopt(scene)?;
         // The taps of `axial` on either side.
-        let beside = (4.0 * self.tables.frame(scene).axial_sigma).ceil().min(AXIAL_REACH as f32) as u32;
+        let beside =
+            (4.0 * self.tables.frame(scene).axial_sigma).ceil().min(AXIAL_REACH as f32) as u32;
         let heard = samples.start.saturating_sub(beside)..samples.end + beside;
         let range = LineRange::of(scene, &self.tables, lines.clone(), heard);
         let passes = &mut self.passes;

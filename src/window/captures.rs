@@ -21,6 +21,7 @@ use crate::output::film::FilmError;
 use crate::output::movie::MovieError;
 use crate::output::mp4::Mp4Error;
 pub(super) use clip::{Clip, Format, largest};
+use insonify_lab::doppler;
 use insonify_lab::exam::{Picture, Report};
 
 /// The settings written beside a picture: see `docs/window.md`.
@@ -133,6 +134,10 @@ pub(super) fn about(frame: &Frame, scene: &str, study: Study) -> About {
         corner: [frame.sector.left, frame.sector.top],
         frequency: frame.probe.frequency,
         transducer: exchange::transducer(&frame.probe),
+        colours: frame
+            .coloured
+            .as_ref()
+            .map(|coloured| doppler::shown(&frame.probe, &coloured.mode.doppler(&frame.settings))),
         study: Some(study),
     }
 }

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use glam::{DAffine3, DQuat, DVec3};
 use insonify::igtl::message::{
-    Content, ExtendedHeader, Message, MetadataEntry, PlacedTool, TrackedTool,
+    Content, ExtendedHeader, HEADER, Message, MetadataEntry, PlacedTool, TrackedTool,
 };
 use insonify::igtl::wire::Label;
 use insonify::igtl::{IMAGE_DEVICE, POSE_DEVICE, Server, ServerSettings, TrackerState};
@@ -234,6 +234,14 @@ fn messages_without_a_checksum_are_taken_and_counted() {
     assert_eq!((place(&server).x, server.status().unchecked), (5.0, 1));
     client.send(&message);
     until("another", || server.status().poses == 2);
+    assert_eq!((server.status().unchecked, server.status().errors), (1, 0));
+    // Of zeros the checksum is 0.
+    let mut zeros = Message::new("ProbeToReference", Content::Transform([0.0; 12])).encode();
+    let body = HEADER..zeros.len();
+    zeros[body].fill(0);
+    zeros[50..58].fill(0);
+    client.send_bytes(&zeros);
+    until("it is heard", || server.status().messages == 3);
     assert_eq!((server.status().unchecked, server.status().errors), (1, 0));
 }
 

@@ -114,6 +114,7 @@ fn colours_and_odd_sizes_are_read_back() {
         corner: [-0.3, 0.05],
         frequency: 3.5,
         transducer: Transducer::Curved,
+        colours: None,
         study: None,
     };
     let grey = [10, 10, 10, 255, 0, 0, 0, 0, 30, 30, 30, 255];
@@ -164,6 +165,7 @@ fn an_image_and_a_loop_of_a_patient_are_sound() {
             corner: [-0.3, 0.05],
             frequency: 5.0,
             transducer: Transducer::Linear,
+            colours: None,
             study: Some(study),
         };
         let [image, film] =

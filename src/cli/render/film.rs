@@ -13,6 +13,7 @@ use super::strained::strained;
 use crate::cli::common;
 use crate::cli::images::Images;
 use insonify::acquire::Recording;
+use insonify::doppler;
 use insonify::exchange::{self, Format, Frames};
 use insonify::output;
 use insonify::output::dicom::About;
@@ -96,12 +97,12 @@ pub fn check(output: &Path, frames: u32) -> Result<()> {
 /// Refuses a file that holds no colours.
 ///
 /// # Errors
-/// Another file than a picture.
+/// Another file than a picture or a film.
 pub fn check_colour(output: &Path) -> Result<()> {
-    match ends(output, ["png", ""]) {
+    match ends(output, ["png", ""]) || film::Film::is_meant(output) {
         true => Ok(()),
         false => Err(miette!(
-            help = "end the name in .png; several frames are numbered",
+            help = "end the name in .png (several frames are numbered), .gif, .mp4 or .dcm; --packet has the numbers",
             "{} holds grey images, and --mode colours them",
             output.display()
         )),
@@ -119,7 +120,7 @@ fn ends(path: &Path, with: [&str; 2]) -> bool {
 }
 
 impl Film {
-    /// Begins the output of frames at these moments, `shown` of them a second.
+    /// Begins the output of frames at these moments, `shown` of them a second, in these colours.
     ///
     /// # Errors
     /// A file that cannot be made; numbered pictures that another run is writing; frames that do not fit into it.
@@ -129,9 +130,11 @@ impl Film {
         scene: &Scene,
         moments: &[Moment],
         shown: f64,
+        colours: Option<Colours>,
         sidecar: Map<String, Value>,
     ) -> Result<Self> {
-        let film = film::Film::of(output, shown, || about(scene, simulator));
+        let about = || about(scene, simulator, colours);
+        let film = film::Film::of(output, shown, colours.is_some(), about);
         let reel = if let Some(film) = film.into_diagnostic()? {
             Reel::Loop(film)
         } else if is_sequence(output) {
@@ -306,14 +309,21 @@ fn area(simulator: &Simulator) -> Area {
 }
 
 /// The facts that a loop in DICOM states beside its frames.
-fn about(scene: &Scene, simulator: &Simulator) -> About {
+fn about(scene: &Scene, simulator: &Simulator, colours: Option<Colours>) -> About {
     let Area { pitch, corner, .. } = area(simulator);
+    let colours = match colours {
+        Some(Colours::Doppler(mode)) => {
+            Some(doppler::shown(&scene.probe, &mode.doppler(&scene.settings)))
+        }
+        Some(Colours::Strain) | None => None,
+    };
     About {
         name: scene.name.clone(),
         pitch,
         corner,
         frequency: scene.probe.frequency,
         transducer: exchange::transducer(&scene.probe),
+        colours,
         study: None,
     }
 }

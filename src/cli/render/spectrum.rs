@@ -12,12 +12,14 @@ use insonify::doppler::broadening::Broadening;
 use insonify::doppler::spectrum::{Analyser, Spectrogram, greys, image_gain};
 use insonify::doppler::trace::{Measured, Trace, measure, trace};
 use insonify::doppler::{gate, nyquist, sound};
+use insonify::exchange;
 use insonify::gpu::FrameTimings;
 use insonify::output;
+use insonify::output::dicom::{self, About, DicomError, SpectralScale};
 use insonify::output::files;
 use insonify::output::npz::{self, Entry};
 use insonify::scene::Scene;
-use insonify::settings::Words;
+use insonify::settings::{Wave, Words};
 use insonify::sim::Simulator;
 
 /// Echoes recorded between two steps of the progress.
@@ -43,9 +45,10 @@ pub fn check(args: &Render, output: &Path, scene: &Scene) -> Result<()> {
             "{name} is for images, and a spectral mode is one recording of a gate"
         ));
     }
-    if output.extension().is_some_and(|e| !e.eq_ignore_ascii_case("png")) {
+    let is_picture = output.extension().is_none_or(|e| e.eq_ignore_ascii_case("png"));
+    if !is_picture && !dicom::is_meant(output) {
         return Err(miette!(
-            help = "end the name in .png; --packet NAME.npz has the numbers",
+            help = "end the name in .png or .dcm; --packet NAME.npz has the numbers",
             "{} is not written: a spectrum is a picture",
             output.display()
         ));
@@ -114,8 +117,11 @@ pub fn write(
     let traces = trace(&made, &lines);
     let measured = measure(&made.times, &traces);
     sidecar.insert("spectrum".into(), facts(scene, &made, &traces, measured));
-    write_picture(output, scene, &made)
-        .map_err(|e| miette!("writing {}: {e}", output.display()))?;
+    match dicom::is_meant(output) {
+        true => write_dicom(output, scene, &made).into_diagnostic()?,
+        false => write_picture(output, scene, &made)
+            .map_err(|e| miette!("writing {}: {e}", output.display()))?,
+    }
     output::line(output.display());
     if let Some(file) = &args.packet {
         let echoes: Vec<[f32; 2]> = echoes.iter().map(|e| [e.re as f32, e.im as f32]).collect();
@@ -161,6 +167,32 @@ fn facts(scene: &Scene, made: &Spectrogram, traces: &Trace, measured: Option<Mea
         "mean_mm_per_s": traces.mean.iter().sum::<f64>() / traces.mean.len().max(1) as f64,
         "measured": measured,
     })
+}
+
+/// The spectra as DICOM, whose region says what a pixel is.
+fn write_dicom(output: &Path, scene: &Scene, made: &Spectrogram) -> Result<(), DicomError> {
+    let (spectral, probe) = (&scene.spectral, &scene.probe);
+    let greys = greys(spectral, made, image_gain(scene));
+    let about = About {
+        name: scene.name.clone(),
+        pitch: 1.0,
+        corner: [0.0; 2],
+        frequency: probe.frequency,
+        transducer: exchange::transducer(probe),
+        colours: None,
+        study: None,
+    };
+    let last = made.times.len() - 1;
+    let step = (made.times[last] - made.times[0]) / last.max(1) as f64;
+    let scale = SpectralScale {
+        continuous: spectral.wave == Wave::Continuous,
+        prf: spectral.prf,
+        angle: spectral.angle.to_degrees(),
+        time: [made.times[0], step],
+        velocity: [made.velocities[made.velocities.len() - 1], -made.step()],
+    };
+    let size = [made.times.len(), made.velocities.len()].map(|n| n as u32);
+    dicom::spectra(output, about, &scale, size, &greys)
 }
 
 fn write_picture(output: &Path, scene: &Scene, made: &Spectrogram) -> std::io::Result<()> {

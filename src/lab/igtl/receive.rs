@@ -8,6 +8,7 @@ use super::answer;
 use super::client::{Client, has_left};
 use super::message::{HEADER, Header, Message};
 use super::server::{LINGER_TIME, ServerSettings, Shared};
+use super::wire::checksum;
 
 /// Most bytes of a message of a type that is read here: a thousand tools.
 const LONGEST_MESSAGE: u64 = 70_000;
@@ -105,9 +106,11 @@ fn receive(client: &Client, shared: &Shared) -> Result<bool, Fault> {
     source.fill(&mut body)?;
     let message = Message::decode(&header, &body)
         .map_err(|why| Fault::Message(format!("a message of type {}: {why}", header.kind)))?;
+    // The checksum of a body of zeros is 0.
+    let unchecked = header.is_unchecked() && checksum(&body) != 0;
     shared.count(|status| {
         status.messages += 1;
-        status.unchecked += u64::from(header.is_unchecked());
+        status.unchecked += u64::from(unchecked);
     });
     answer::answer(client, shared, &message).map_err(|refused| match refused {
         answer::Refused::Pose(why) => Fault::Pose(why),

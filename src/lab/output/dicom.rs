@@ -8,10 +8,12 @@ use std::path::{Path, PathBuf};
 
 mod cine;
 mod data;
+mod regions;
 mod study;
 mod volume;
 
-pub use cine::{About, Loop, still};
+pub use cine::{About, Loop, spectra, still};
+pub use regions::{ColourBox, SpectralScale};
 pub use study::{Patient, Study};
 pub use volume::{Motion, Volume};
 

@@ -43,17 +43,19 @@ impl Film {
         Movie::is_meant(path) || Mp4::is_meant(path) || dicom::is_meant(path)
     }
 
-    /// The film that `path` names by its extension, `rate` images a second; `about` is the head of a DICOM file. None for
-    /// other files.
+    /// The film that `path` names by its extension, `rate` images a second, with colours or grey; `about` is the head of a
+    /// DICOM file. None for other files.
     ///
     /// # Errors
     /// Errors of the file system.
     pub fn of(
         path: &Path,
         rate: f64,
+        colours: bool,
         about: impl FnOnce() -> About,
     ) -> Result<Option<Self>, FilmError> {
         Ok(Some(match path {
+            path if Movie::is_meant(path) && colours => Self::Gif(Movie::coloured(path)?),
             path if Movie::is_meant(path) => Self::Gif(Movie::new(path)?),
             path if Mp4::is_meant(path) => Self::Mp4(Mp4::new(path, rate)),
             path if dicom::is_meant(path) => Self::dicom(path, about(), Some(1e3 / rate)),

@@ -2,13 +2,12 @@
 
 use glam::{DAffine3, DMat3, DVec3};
 
+use crate::settings::units::FARTHEST;
 use crate::settings::words;
 
 /// Largest deviation of the axes of a rigid transform from unit vectors at right angles: the rounding of
 /// 32-bit floats and of three written decimals.
 const RIGID: f64 = 2e-3;
-/// Greatest distance from the origin at which a tool is tracked, mm.
-const FAR: f64 = 1e5;
 
 words! {
     /// Meaning of x and y of the scene's world. z grows to the head in both.
@@ -75,8 +74,8 @@ pub fn rigid(transform: DAffine3) -> Result<DAffine3, String> {
     if !transform.is_finite() {
         return Err("it holds values that are no finite numbers".to_owned());
     }
-    if transform.translation.length() > FAR {
-        return Err(format!("it lies more than {FAR} mm from the origin"));
+    if transform.translation.length() > FARTHEST {
+        return Err(format!("it lies more than {FARTHEST} mm from the origin"));
     }
     let m = transform.matrix3;
     let off = (m.transpose() * m - DMat3::IDENTITY).to_cols_array();

@@ -4,6 +4,10 @@ use std::fmt;
 
 use serde::de::{DeserializeSeed, Deserializer, Error, Visitor};
 
+/// Largest distance from the origin along an axis at which anything of a scene lies, mm: single precision, in which meshes and
+/// the device have their coordinates, resolves a hundredth of a millimetre there.
+pub const FARTHEST: f64 = 1e5;
+
 /// A measure: a kind of quantity with its units.
 #[derive(Debug, PartialEq)]
 pub struct Measure {

@@ -2,13 +2,11 @@
 
 use glam::{DAffine3, DMat3, DVec3};
 
+use crate::settings::units::FARTHEST;
+
 /// Smallest volume of the box that the unit vectors of the axes span; below it two axes are nearly
 /// parallel (three degrees apart, the third upright) and positions mean nothing.
 const MIN_DETERMINANT: f64 = 0.05;
-
-/// Largest distance of the first voxel from the origin along an axis, mm: what single precision, in which meshes and the
-/// device have their coordinates, resolves to a hundredth of a millimetre. Placements of meshes have the same limit.
-const FAR: f64 = 1e5;
 
 /// Anatomical frame of a file. The letters name the directions in which x, y and z grow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -83,9 +81,9 @@ impl Grid {
             return Err(format!("the direction is singular: its unit axes span {determinant:.4}"));
         }
         let far = self.origin.abs().max_element() * self.unit;
-        if far > FAR {
+        if far > FARTHEST {
             return Err(format!(
-                "the first voxel is {far:.3e} mm away, and at most {FAR:e} mm can be resolved: the origin or its unit is wrong"
+                "the first voxel is {far:.3e} mm away, and at most {FARTHEST:e} mm can be resolved: the origin or its unit is wrong"
             ));
         }
         let place = |v: DVec3| v * self.frame.lps_signs() * self.unit;

@@ -7,10 +7,9 @@ use dicom_core::Tag;
 use dicom_dictionary_std::{tags, uids};
 
 use super::data::{DataSet, Frames, MAX_PIXELS};
+use super::regions::{self, ColourBox, SpectralScale};
 use super::{DicomError, Study, Transducer};
 
-/// Code of centimetres in a region (PS3.3, C.8.5.5.1.15).
-const CENTIMETRES: u16 = 3;
 /// Most frames with a time each: numbers in text of 17 bytes, in an element of 16-bit length.
 const MOST_TIMED: usize = 0xfffe / 17;
 /// Comment in each file, whatever is typed.
@@ -29,6 +28,8 @@ pub struct About {
     pub frequency: f64,
     /// Its shape.
     pub transducer: Transducer,
+    /// Where colours of Doppler lie over it; none of grey images.
+    pub colours: Option<ColourBox>,
     /// Whose image it is; none where nobody says.
     pub study: Option<Study>,
 }
@@ -119,15 +120,26 @@ impl Loop {
         times: impl IntoIterator<Item = f64>,
     ) -> Result<(), DicomError> {
         let count = self.frames.to_string();
-        self.write(uids::ULTRASOUND_MULTI_FRAME_IMAGE_STORAGE, |data| {
+        let regions = self.regions();
+        self.write(uids::ULTRASOUND_MULTI_FRAME_IMAGE_STORAGE, regions, |data| {
             data.decimals(tag, times);
             data.put(tags::FRAME_INCREMENT_POINTER, tag);
             data.put(tags::NUMBER_OF_FRAMES, count);
         })
     }
 
-    /// Writes a file of this class, with what else it has.
-    fn write(self, class: &str, add: impl FnOnce(&mut DataSet)) -> Result<(), DicomError> {
+    /// The regions of images.
+    fn regions(&self) -> Vec<DataSet> {
+        regions::of_image(&self.about, self.size.expect("a frame"))
+    }
+
+    /// Writes a file of this class, with its regions and what else it has.
+    fn write(
+        self,
+        class: &str,
+        regions: Vec<DataSet>,
+        add: impl FnOnce(&mut DataSet),
+    ) -> Result<(), DicomError> {
         let [width, height] = self.size.expect("a frame");
         let mut data = DataSet::new();
         data.common(&self.about.name);
@@ -140,7 +152,7 @@ impl Loop {
         data.put(tags::LATERALITY, "");
         data.put(tags::TRANSDUCER_TYPE, self.about.transducer.term());
         add(&mut data);
-        data.items(tags::SEQUENCE_OF_ULTRASOUND_REGIONS, [region(&self.about, [width, height])]);
+        data.items(tags::SEQUENCE_OF_ULTRASOUND_REGIONS, regions);
         data.pixels(&Frames { width, height, color: self.color }, self.pixels);
         data.write(&self.path, class)
     }
@@ -161,43 +173,28 @@ pub fn still(
 ) -> Result<(), DicomError> {
     let mut image = Loop::new(path, about);
     image.add(width, height, rgba)?;
-    image.write(uids::ULTRASOUND_IMAGE_STORAGE, |_| {})
+    let regions = image.regions();
+    image.write(uids::ULTRASOUND_IMAGE_STORAGE, regions, |_| {})
 }
 
-/// The one region: the whole image, in cm from the middle of the transducer's face (PS3.3, C.8.5.5).
-fn region(about: &About, [width, height]: [u32; 2]) -> DataSet {
-    let About { pitch, corner, frequency, .. } = *about;
-    let mut region = DataSet::new();
-    // 2D, tissue, no flags.
-    region.put(tags::REGION_SPATIAL_FORMAT, 1u16);
-    region.put(tags::REGION_DATA_TYPE, 1u16);
-    region.put(tags::REGION_FLAGS, 0u32);
-    region.put(tags::REGION_LOCATION_MIN_X0, 0u32);
-    region.put(tags::REGION_LOCATION_MIN_Y0, 0u32);
-    region.put(tags::REGION_LOCATION_MAX_X1, width - 1);
-    region.put(tags::REGION_LOCATION_MAX_Y1, height - 1);
-    let x = [
-        tags::REFERENCE_PIXEL_X0,
-        tags::PHYSICAL_UNITS_X_DIRECTION,
-        tags::REFERENCE_PIXEL_PHYSICAL_VALUE_X,
-        tags::PHYSICAL_DELTA_X,
-    ];
-    let y = [
-        tags::REFERENCE_PIXEL_Y0,
-        tags::PHYSICAL_UNITS_Y_DIRECTION,
-        tags::REFERENCE_PIXEL_PHYSICAL_VALUE_Y,
-        tags::PHYSICAL_DELTA_Y,
-    ];
-    for ([reference, units, value, delta], corner) in [x, y].into_iter().zip(corner) {
-        // The pixel that the middle of the face lies in; it may be above the image.
-        let pixel = (-corner / pitch).floor();
-        let place = corner + (pixel + 0.5) * pitch;
-        region.put(reference, pixel as i32);
-        region.put(units, CENTIMETRES);
-        region.put(value, place / 10.0);
-        region.put(delta, pitch / 10.0);
-    }
-    // kHz.
-    region.put(tags::TRANSDUCER_FREQUENCY, (frequency * 1e3).round() as u32);
-    region
+/// Writes a file of spectra against time: grey levels, row by row, and what a pixel is in seconds and cm/s. Pitch and corner of
+/// `about` mean nothing.
+///
+/// # Errors
+/// Errors of the file system.
+///
+/// # Panics
+/// When the pixels are not those of the size.
+pub fn spectra(
+    path: &Path,
+    about: About,
+    scale: &SpectralScale,
+    [width, height]: [u32; 2],
+    greys: &[u8],
+) -> Result<(), DicomError> {
+    let region = regions::of_spectra(&about, scale, [width, height]);
+    let mut image = Loop::new(path, about);
+    let rgba: Vec<u8> = greys.iter().flat_map(|&grey| [grey, grey, grey, 255]).collect();
+    image.add(width, height, &rgba)?;
+    image.write(uids::ULTRASOUND_IMAGE_STORAGE, vec![region], |_| {})
 }

@@ -104,6 +104,7 @@ mod tests {
             corner: [-0.3, 0.0],
             frequency: 5.0,
             transducer: Transducer::Linear,
+            colours: None,
             study,
         }
     }

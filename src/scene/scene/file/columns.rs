@@ -9,13 +9,12 @@ use toml::Spanned;
 use super::error::SceneError;
 use crate::issue::{self, FileError};
 use crate::settings::suggest;
+use crate::settings::units::FARTHEST;
 
 /// Largest file, bytes.
 const MAX_TEXT: u64 = 16 << 20;
 /// Most rows: an hour at 50 a second and some.
 const MAX_ROWS: usize = 200_000;
-/// Farthest position, mm, as for everything that is placed.
-const FAR: f64 = 1e5;
 
 /// A kind of such files.
 pub(super) struct ColumnFile {
@@ -220,7 +219,7 @@ impl<'t> Columns<'t> {
                     format!("{} values of {name}, and {rows} of {first}", column.values.len());
                 return Err(self.fail(at, message, &format!("give as many as of {first}")));
             }
-            let wild = |v: &f64| !v.is_finite() || name.ends_with("mm") && v.abs() > FAR;
+            let wild = |v: &f64| !v.is_finite() || name.ends_with("mm") && v.abs() > FARTHEST;
             if let Some(row) = column.values.iter().position(wild) {
                 let (value, at) = (column.values[row], column.places[row].clone());
                 let message = match value.is_finite() {

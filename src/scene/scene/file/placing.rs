@@ -5,7 +5,7 @@ use glam::{DAffine3, DMat3, DQuat, DVec3};
 use super::document::Document;
 use super::error::SceneError;
 use super::table::Stated;
-use crate::settings::units::{ANGLE, LENGTH};
+use crate::settings::units::{ANGLE, FARTHEST, LENGTH};
 use crate::settings::{Facts, Form, group};
 
 /// Least and largest factor by which a placement scales.
@@ -15,7 +15,7 @@ pub(super) const AXIS: Facts = Facts::of(Form::Direction).key("rotate.axis").req
 /// The angle about it.
 pub(super) const TURN: Facts = Facts::quantity(&ANGLE, -1e3, 1e3).key("rotate.angle").required();
 /// Three lengths from a place where anatomy may be.
-pub(super) const PLACE: Facts = Facts::quantities(&LENGTH, 3, -1e5, 1e5);
+pub(super) const PLACE: Facts = Facts::quantities(&LENGTH, 3, -FARTHEST, FARTHEST);
 
 group! {
     /// Size of something that keeps its proportions.
@@ -54,8 +54,6 @@ group! {
     }
 }
 
-/// Farthest shift along an axis, mm, as of the keys that say it alone.
-const FAR: f64 = 1e5;
 /// Volume of the box that the unit vectors become, over the product of their lengths, at and below which a matrix is
 /// flat for single precision.
 const FLAT: f64 = 1e-6;
@@ -90,10 +88,10 @@ pub(super) fn placed(
             "this matrix is flat: it has no inverse".to_owned(),
             "write it row by row; the shift is the fourth column, mm".to_owned(),
         ),
-        None => match shifts.iter().find(|shift| !(-FAR..=FAR).contains(*shift)) {
+        None => match shifts.iter().find(|shift| !(-FARTHEST..=FARTHEST).contains(*shift)) {
             Some(shift) => (
                 format!("this matrix shifts by {shift} mm"),
-                format!("it must lie between -{FAR} and {FAR} mm"),
+                format!("it must lie between -{FARTHEST} and {FARTHEST} mm"),
             ),
             None => return Ok(placement),
         },
