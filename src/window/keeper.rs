@@ -26,6 +26,8 @@ const PAUSE: Duration = Duration::from_secs(2);
 const SCENE: &str = "scene.toml";
 const SESSION: &str = "session.json";
 const LOCK: &str = "lock";
+/// An empty one, which says that there is room.
+const TRIAL: &str = "trial";
 
 /// The variable of the environment that names the system's folder for the state of programs.
 pub(super) const STATE_VARIABLE: &str = "XDG_STATE_HOME";
@@ -230,7 +232,11 @@ fn write(all: &Path, own: &mut Option<(PathBuf, File)>, draft: &Draft) -> Result
         None => own.insert(folder(all)?),
     };
     let saved = save(&draft.session.scene, &folder.join(SCENE), &draft.entries);
-    saved.map_err(|error| Error::other(error.to_string()))?;
+    if let Err(error) = saved {
+        // A scene file that somebody is editing is none for a while: what was kept before stays until the next change.
+        let room = files::replace(&folder.join(TRIAL), &[]);
+        return room.map_err(|_| Error::other(error.to_string()));
+    }
     let text = serde_json::to_vec(&draft.session).map_err(Error::other)?;
     files::replace(&folder.join(SESSION), &text)
 }

@@ -196,5 +196,8 @@ pub fn spectra(
     let mut image = Loop::new(path, about);
     let rgba: Vec<u8> = greys.iter().flat_map(|&grey| [grey, grey, grey, 255]).collect();
     image.add(width, height, &rgba)?;
-    image.write(uids::ULTRASOUND_IMAGE_STORAGE, vec![region], |_| {})
+    image.write(uids::ULTRASOUND_IMAGE_STORAGE, vec![region], |data| {
+        // No 2D imaging.
+        data.texts(tags::IMAGE_TYPE, &["ORIGINAL", "PRIMARY"]);
+    })
 }
