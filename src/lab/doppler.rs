@@ -48,7 +48,7 @@ pub fn make_packet(
     Ok(packet)
 }
 
-/// Where the box of these settings lies over an image, and how fast its pulses follow each other.
+/// The box of these settings over an image: its edges, and how fast its pulses follow each other.
 pub fn shown(probe: &Probe, doppler: &Doppler) -> ColourBox {
     let mut edges = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
     // Arcs of a sector are farthest out at their ends or where they cross its middle.

@@ -93,7 +93,7 @@ fn npy(array: Array, made: &Made, precision: Precision) -> Vec<u8> {
     out
 }
 
-/// What the numbers of each array in half precision are to be multiplied by.
+/// The factor by which the numbers of each array in half precision are to be multiplied, by the array's name.
 fn scales(plan: &Plan, made: &Made) -> Map<String, Value> {
     let half = plan.arrays.iter().filter(|_| plan.precision == Precision::Half);
     let scaled = half.filter_map(|array| match values(*array, made) {

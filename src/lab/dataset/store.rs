@@ -417,7 +417,7 @@ pub(super) fn thousand(number: u64) -> String {
     format!("{:03}", number / u64::from(PER_FOLDER))
 }
 
-/// What lies in a folder of samples, and in those of a thousand each below it.
+/// The entries of a folder of samples, and of those of a thousand each below it.
 pub(super) fn within(folder: &Path) -> Vec<DirEntry> {
     let entries = |folder: &Path| std::fs::read_dir(folder).into_iter().flatten().flatten();
     let is_folder = |entry: &DirEntry| entry.file_type().is_ok_and(|kind| kind.is_dir());

@@ -28,7 +28,7 @@ pub struct About {
     pub frequency: f64,
     /// Its shape.
     pub transducer: Transducer,
-    /// Where colours of Doppler lie over it; none of grey images.
+    /// The box of Doppler colours over it; none of grey images.
     pub colours: Option<ColourBox>,
     /// Whose image it is; none where nobody says.
     pub study: Option<Study>,

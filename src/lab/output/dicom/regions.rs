@@ -30,7 +30,7 @@ pub struct ColourBox {
     pub prf: f64,
 }
 
-/// What the pixels of spectra against time are.
+/// The scales of spectra against time: seconds and velocity of their pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpectralScale {
     /// True for a continuous wave.
